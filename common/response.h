@@ -1,0 +1,56 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * Camera response: from the codes a sensor delivers to linear radiance, and back.
+ * code in [0, 1] is the sensor's full scale (255, 4095, 65535 -> 1); float formats pass through.
+ */
+#ifndef GN_COMMON_RESPONSE_H
+#define GN_COMMON_RESPONSE_H
+
+#include <stdbool.h>
+
+#include "proto/attr.h"
+
+enum gn_response_type {
+    GN_RESPONSE_LINEAR = 0,
+    GN_RESPONSE_SRGB = 1,  // IEC 61966-2-1
+    GN_RESPONSE_GAMMA = 2, // code = linear^(1/gamma)
+    GN_RESPONSE_LOG = 3,   // code = a + b ln(c + linear); HDRC-like sensors
+    GN_RESPONSE_TABLE = 4, // linear value at equally spaced codes, interpolated linearly, rising
+    GN_RESPONSE_COUNT
+};
+
+/** How one device turns light into codes. A value; the table is borrowed while it is used. */
+struct gn_response {
+    enum gn_response_type type;
+    double gamma;        // [0.1, 10], for GAMMA
+    double log_a;        // for LOG, in codes as a share of full scale
+    double log_b;        // for LOG, > 0
+    double log_c;        // for LOG, >= 0, in linear units
+    const float *table;  // [table_size], for TABLE; borrowed, may be NULL otherwise
+    int table_size;      // [2, 4096]
+    double to_rec709[9]; // row-major 3x3, linear device RGB to linear Rec.709; all zero: identity
+    double scale;        // radiance per linear unit; 0: 1
+};
+
+/** Checks ranges. Returns 0, or -EINVAL and a sentence (static string) in *out_reason. */
+GN_MUST_USE int gn_response_check(const struct gn_response *response, const char **out_reason);
+
+/** "linear", "srgb", "gamma", "log", "table"; NULL for a bad type. */
+const char *gn_response_get_name(enum gn_response_type type);
+
+/** Linear value in device units of one code (no matrix, no scale); >= 0; NaN and below range give
+ * 0. */
+float gn_response_decode(const struct gn_response *response, float code);
+/** The code in [0, 1] of one linear device value; the inverse of decode, clamped. */
+float gn_response_encode(const struct gn_response *response, float linear);
+
+/**
+ * Device codes to Rec.709 radiance: decode, matrix, scale; negatives that the matrix makes are
+ * clamped to 0. rgb[n][3], in place. Thread-safety: safe.
+ */
+void gn_response_to_radiance(const struct gn_response *response, float *rgb, long n);
+/** The inverse: Rec.709 radiance to codes in [0, 1]. rgb[n][3], in place. */
+void gn_response_from_radiance(const struct gn_response *response, float *rgb, long n);
+
+#endif

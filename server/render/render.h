@@ -1,0 +1,94 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * One frame: from scene, lighting state and view to layers. The plan says which passes run and why
+ * the others do not; the passes are in primary.c, shade.c, shadow.c, reference.c.
+ */
+#ifndef GN_SERVER_RENDER_RENDER_H
+#define GN_SERVER_RENDER_RENDER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/camera.h"
+#include "common/image.h"
+#include "common/pool.h"
+#include "server/light/state.h"
+#include "server/scene/scene.h"
+
+enum gn_quality {
+    GN_QUALITY_INTERACTIVE = 0,
+    GN_QUALITY_SEED = 1,      // the 2007 paper to the letter
+    GN_QUALITY_REFERENCE = 2, // every texel, exact visibility: slow, the judge of the others
+};
+
+/** How diffuse virtual objects are lit: the paper's two variants. */
+enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE_MAP = 1 };
+
+/** All-zero is the default of the quality. */
+struct gn_render_options {
+    enum gn_quality quality;
+    enum gn_shading shading;
+    bool no_shadow;               // leave the shadow on real surfaces out
+    bool shadow_unweighted;       // the paper's sums without the cosine (SEED implies it)
+    bool shadow_ignore_real;      // real blockers do not count in the sums (SEED implies it)
+    bool all_passes;              // switch every omission of the plan off (for tests)
+    int bounces;                  // reference only: indirect bounces, [0, 16]
+    int samples_per_texel_bounce; // reference only, paths per pixel where bounces > 0; default 256
+    uint64_t seed;                // of the reference's random paths
+};
+
+/** The picture's layers; linear radiance. Thread-safety: unsafe; sized once, reused frame by frame.
+ */
+struct gn_layers {
+    int width, height;
+    struct gn_image virtual_rgba; // [h][w][4], premultiplied linear radiance, coverage
+    struct gn_image shadow;       // [h][w][3], [0, 1]
+    struct gn_image added;        // [h][w][3], linear radiance per unit of albedo-true light, >= 0
+    struct gn_image depth; // [h][w][1], m along the camera's z, INFINITY where nothing is hit
+};
+GN_MUST_USE int gn_layers_init(struct gn_layers *layers, int width, int height);
+void gn_layers_finish(struct gn_layers *layers);
+
+/** Most passes a plan lists. */
+#define GN_PLAN_MAX 16
+
+/** One line of the plan. Strings are static. */
+struct gn_plan_entry {
+    const char *pass; // "primary", "shade", "mirror", "shadow", "added", ...
+    bool ran;
+    const char *why;
+};
+
+/** The receipt's figures of one frame. */
+struct gn_render_report {
+    int n_plan;
+    struct gn_plan_entry plan[GN_PLAN_MAX];
+    double ms_plan, ms_primary, ms_shade, ms_shadow, ms_total;
+    uint64_t rays_primary, rays_shade, rays_shadow, rays_mirror;
+    int n_lights;
+    double estimated_error; // of the shadow factor, RMS over the affected pixels; < 0: not known
+    int64_t n_virtual_pixels, n_shadow_pixels; // pixels with coverage > 0, with a factor < 1
+};
+
+/** Keeps what frames share (scratch memory per size). Thread-safety: unsafe (one frame at a time).
+ */
+struct gn_renderer;
+/** scene is borrowed until the renderer is destroyed; pool too (may be NULL). */
+GN_MUST_USE int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
+                                   struct gn_renderer **out_renderer, struct gn_error *out_error);
+/** NULL-safe; nulls *renderer. */
+void gn_renderer_destroy(struct gn_renderer **renderer);
+
+/**
+ * Renders one view. layers must have been made by gn_layers_init; it is resized where its size
+ * differs from the camera's (the only allocation; none while the size stays). Same bits whatever
+ * the pool's size. Returns 0, -EINVAL and a sentence, -ENOMEM.
+ */
+GN_MUST_USE int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *camera,
+                                   const struct gn_lighting_state *light,
+                                   const struct gn_render_options *options,
+                                   struct gn_layers *layers, struct gn_render_report *out_report,
+                                   struct gn_error *out_error);
+
+#endif

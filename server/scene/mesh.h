@@ -1,0 +1,48 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * Triangle meshes: what rt traces, and their files through Assimp (OBJ, glTF 2.0, PLY).
+ * Coordinates are taken as the file has them.
+ */
+#ifndef GN_SERVER_SCENE_MESH_H
+#define GN_SERVER_SCENE_MESH_H
+
+#include <stdint.h>
+
+#include "common/error.h"
+#include "proto/attr.h"
+
+/** Most triangles one mesh may have. */
+#define GN_MESH_MAX_TRIANGLES (1 << 25)
+
+/** An indexed triangle mesh in object coordinates, m. Caller's memory, our arrays (malloc). */
+struct gn_mesh {
+    int n_vertices;
+    int n_triangles;
+    float *positions;    // [n_vertices][3], finite
+    float *normals;      // [n_vertices][3], unit; may be NULL: flat
+    uint32_t *triangles; // [n_triangles][3], each < n_vertices; counter-clockwise seen from outside
+    float *albedos;      // [n_triangles][3], [0, 1]; may be NULL: the object's material
+};
+
+/** Frees the arrays and zeroes *mesh. */
+void gn_mesh_finish(struct gn_mesh *mesh);
+
+/**
+ * Checks indices, finiteness and counts; drops triangles of zero area (counted in *out_dropped, may
+ * be NULL). Returns 0 or -EINVAL and a sentence: an empty mesh is an error.
+ */
+GN_MUST_USE int gn_mesh_check(struct gn_mesh *mesh, int *out_dropped, struct gn_error *out_error);
+
+/**
+ * Reads all triangles of the file into one mesh, node transforms applied, diffuse colours of its
+ * materials in albedos. Returns 0 or a negative errno and a sentence naming the file.
+ */
+GN_MUST_USE int gn_mesh_read_file(const char *path, struct gn_mesh *out_mesh,
+                                  struct gn_error *out_error);
+
+/** Writes Wavefront OBJ (positions, normals where present). Returns 0 or a negative errno. */
+GN_MUST_USE int gn_mesh_write_obj(const struct gn_mesh *mesh, const char *path,
+                                  struct gn_error *out_error);
+
+#endif

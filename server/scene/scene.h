@@ -1,0 +1,82 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * A scene: real and virtual objects with materials, read from scene.json, and their rays.
+ */
+#ifndef GN_SERVER_SCENE_SCENE_H
+#define GN_SERVER_SCENE_SCENE_H
+
+#include <stdbool.h>
+
+#include "common/error.h"
+#include "common/pool.h"
+#include "proto/attr.h"
+#include "server/scene/mesh.h"
+#include "server/scene/rt.h"
+
+/** Most objects a manifest may list. */
+#define GN_SCENE_MAX_OBJECTS 4096
+
+enum gn_material_type { GN_MATERIAL_DIFFUSE = 0, GN_MATERIAL_MIRROR = 1 };
+
+/** What an object is made of. */
+struct gn_material {
+    enum gn_material_type type;
+    float albedo[3]; // [0, 1]; diffuse: reflectance; mirror: reflectance for each channel
+};
+
+/** One object. `mesh` in object coordinates. */
+struct gn_scene_object {
+    char *name;          // the mesh's file name or the manifest's "name"; owned
+    enum gn_rt_set role; // GN_RT_REAL or GN_RT_VIRTUAL
+    struct gn_material material;
+    bool has_material; // false: the mesh's own albedos, or diffuse 0.5
+    double world_from_object[16];
+    double normal_matrix[9]; // inverse transpose of the 3x3 part, row-major, for shading normals
+    struct gn_mesh mesh;     // owned
+};
+
+/** Thread-safety: immutable after create. */
+struct gn_scene {
+    int n_objects;
+    struct gn_scene_object *objects; // [n_objects], owned; index = object id in rt
+    struct gn_rt *rt;                // owned, committed
+    int n_real_triangles;
+    int n_virtual_triangles;
+};
+
+/**
+ * Reads scene.json of docs/frames.md (paths relative to it), all meshes, and commits. An unknown
+ * key, role or material type, a missing mesh, a singular matrix, a light list (not built yet) is
+ * refused with the file, the place and what would be right. A scene without objects is an error.
+ */
+GN_MUST_USE int gn_scene_read_file(const char *path, struct gn_pool *pool,
+                                   struct gn_scene **out_scene, struct gn_error *out_error);
+
+/**
+ * The same from objects in memory: takes the array and all in it on success (zeroed for the
+ * caller); on failure it stays the caller's.
+ */
+GN_MUST_USE int gn_scene_create(struct gn_scene_object *objects, int n_objects,
+                                struct gn_pool *pool, struct gn_scene **out_scene,
+                                struct gn_error *out_error);
+
+/** NULL-safe; nulls *scene. */
+void gn_scene_destroy(struct gn_scene **scene);
+
+/** What the shading needs to know of a hit. */
+struct gn_surface {
+    float point[3];            // m, world
+    float normal_geometric[3]; // unit, turned to the side the ray came from
+    float normal_shading[3];   // unit, interpolated; same side
+    float albedo[3];
+    enum gn_material_type material;
+    enum gn_rt_set role;
+};
+
+/** Evaluates a hit of a ray with unit direction dir from org. Thread-safety: safe. */
+void gn_scene_get_surface(const struct gn_scene *scene, const float org[static 3],
+                          const float dir[static 3], const struct gn_rt_hit *hit,
+                          struct gn_surface *out_surface);
+
+#endif
