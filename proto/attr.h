@@ -11,7 +11,7 @@
 #define GN_MUST_USE __attribute__((warn_unused_result))
 
 /** printf checking: format_index and first_arg_index count from 1. */
-#define GN_PRINTF(format_index, first_arg_index) \
+#define GN_PRINTF(format_index, first_arg_index)                                                   \
     __attribute__((format(printf, format_index, first_arg_index)))
 
 #if defined(__clang__)
