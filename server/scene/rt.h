@@ -25,9 +25,14 @@ enum gn_rt_set { GN_RT_REAL = 1, GN_RT_VIRTUAL = 2, GN_RT_ALL = 3 };
 /** A committed scene for rays. Thread-safety: immutable after gn_rt_commit; then rays are safe. */
 struct gn_rt;
 
+/** Largest coordinate a vertex may have in world, m. */
+#define GN_RT_MAX_COORDINATE 1e9
+
 /** Where a ray met a surface. */
 struct gn_rt_hit {
     float distance;    // m, along the unit direction
+    float point[3];    // m, world: on the triangle itself, more exact than org + distance dir
+    float clearance;   // m, > 0: how far from point a new ray starts: gn_rt_offset_origin
     float normal[3];   // geometric, unit, of the triangle's winding (not turned to the ray), world
     float u, v;        // barycentric: p = (1-u-v) p0 + u p1 + v p2
     uint32_t object;   // the id given to gn_rt_add_mesh
@@ -83,13 +88,17 @@ uint32_t gn_rt_get_occluded16(const struct gn_rt *rt, enum gn_rt_set set,
                               const struct gn_rt_packet *packet);
 
 /**
- * Moves a hit point off its surface, to the side of the geometric normal that `toward` points to,
- * far enough that a new ray does not meet the same surface at any scale of the scene, and not
- * farther: integer steps in the floats' own spacing, scaled near zero.
- * Source: Waechter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray
- * Tracing Gems (2019), chapter 6.
+ * Moves a hit point off its surface, by the hit's clearance along the geometric normal, to the side
+ * that `toward` points to: far enough that a new ray does not meet the same surface, not farther.
+ *   clearance = 2^-23 (4 max|p| + 16 max|v_i - p|), |.| the largest coordinate
+ * bounds what rounds: the point and the new origin themselves (half an ulp of p for each
+ * coordinate, twice), and the tracer's own v_i - origin and their products (a few ulp of the
+ * triangle's size). It needs no constant length, so it holds for a scene of any size anywhere;
+ * steps that know only the point (Waechter and Binder, Ray Tracing Gems, 2019, chapter 6) fail
+ * where the triangle is large beside its distance from the origin, and lift 1/65536 m near it.
+ * Checked by tests/numeric/rt_offset.c.
  */
-void gn_rt_offset_origin(const float point[static 3], const float normal[static 3],
+void gn_rt_offset_origin(const float point[static 3], const float normal[static 3], float clearance,
                          const float toward[static 3], float out_org[static 3]);
 
 #endif

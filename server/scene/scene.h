@@ -67,6 +67,7 @@ void gn_scene_destroy(struct gn_scene **scene);
 /** What the shading needs to know of a hit. */
 struct gn_surface {
     float point[3];            // m, world
+    float clearance;           // m, for gn_rt_offset_origin
     float normal_geometric[3]; // unit, turned to the side the ray came from
     float normal_shading[3];   // unit, interpolated; same side
     float albedo[3];
