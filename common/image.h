@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * Pictures in memory: linear float images and 8-bit images, and their files.
+ * Pictures in memory: linear float images, 8-bit and 16-bit code images.
  * Rows from the top, pixels from the left, channels interleaved: [height][width][channels].
  */
 #ifndef GN_COMMON_IMAGE_H
@@ -33,6 +33,14 @@ struct gn_image8 {
     uint8_t *data; // [height][width][channels], owned
 };
 
+/** A 16-bit picture: sensor codes as they are (12-bit codes use [0, 4095]). */
+struct gn_image16 {
+    int width;
+    int height;
+    int channels;   // 1 or 3
+    uint16_t *data; // [height][width][channels], owned
+};
+
 /**
  * Allocates zeroed pixels. Returns 0, -EINVAL (a side < 1 or > GN_IMAGE_MAX_SIDE, too many pixels,
  * channels outside [1, 4]), -ENOMEM; *image is zeroed on failure.
@@ -46,6 +54,11 @@ GN_MUST_USE int gn_image8_init(struct gn_image8 *image, int width, int height, i
 /** As gn_image_finish. */
 void gn_image8_finish(struct gn_image8 *image);
 
+/** As gn_image_init, for 16-bit pictures. */
+GN_MUST_USE int gn_image16_init(struct gn_image16 *image, int width, int height, int channels);
+/** As gn_image_finish. */
+void gn_image16_finish(struct gn_image16 *image);
+
 /** The pixel at column x of row y, [channels]. */
 static inline float *gn_image_at(const struct gn_image *image, int x, int y)
 {
@@ -54,6 +67,12 @@ static inline float *gn_image_at(const struct gn_image *image, int x, int y)
 
 /** The pixel at column x of row y, [channels]. */
 static inline uint8_t *gn_image8_at(const struct gn_image8 *image, int x, int y)
+{
+    return image->data + ((size_t)y * (size_t)image->width + (size_t)x) * (size_t)image->channels;
+}
+
+/** The pixel at column x of row y, [channels]. */
+static inline uint16_t *gn_image16_at(const struct gn_image16 *image, int x, int y)
 {
     return image->data + ((size_t)y * (size_t)image->width + (size_t)x) * (size_t)image->channels;
 }

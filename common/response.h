@@ -16,7 +16,7 @@ enum gn_response_type {
     GN_RESPONSE_SRGB = 1,  // IEC 61966-2-1
     GN_RESPONSE_GAMMA = 2, // code = linear^(1/gamma)
     GN_RESPONSE_LOG = 3,   // code = a + b ln(c + linear); HDRC-like sensors
-    GN_RESPONSE_TABLE = 4, // linear value at equally spaced codes, interpolated linearly, rising
+    GN_RESPONSE_TABLE = 4, // linear value at equally spaced codes, interpolated, never falling
     GN_RESPONSE_COUNT
 };
 
@@ -30,7 +30,7 @@ struct gn_response {
     const float *table;  // [table_size], for TABLE; borrowed, may be NULL otherwise
     int table_size;      // [2, 4096]
     double to_rec709[9]; // row-major 3x3, linear device RGB to linear Rec.709; all zero: identity
-    double scale;        // radiance per linear unit; 0: 1
+    double scale;        // radiance per linear unit, >= 0; 0: 1
 };
 
 /** Checks ranges. Returns 0, or -EINVAL and a sentence (static string) in *out_reason. */
@@ -38,16 +38,24 @@ GN_MUST_USE int gn_response_check(const struct gn_response *response, const char
 
 /** "linear", "srgb", "gamma", "log", "table"; NULL for a bad type. */
 const char *gn_response_get_name(enum gn_response_type type);
+/** The type of that name, or -EINVAL. */
+GN_MUST_USE int gn_response_from_name(const char *name, enum gn_response_type *out_type);
 
-/** Linear value in device units of one code (no matrix, no scale); >= 0; NaN and below range give
- * 0. */
+/**
+ * Linear value in device units of one code (no matrix, no scale); >= 0; NaN and below range give 0.
+ * Codes above 1 go on by the same formula (a table stays at its last value).
+ */
 float gn_response_decode(const struct gn_response *response, float code);
-/** The code in [0, 1] of one linear device value; the inverse of decode, clamped. */
+/**
+ * The code in [0, 1] of one linear device value; the inverse of decode, clamped. NaN gives the code
+ * of 0. Where a table is flat it is the lowest code.
+ */
 float gn_response_encode(const struct gn_response *response, float linear);
 
 /**
  * Device codes to Rec.709 radiance: decode, matrix, scale; negatives that the matrix makes are
- * clamped to 0. rgb[n][3], in place. Thread-safety: safe.
+ * clamped to 0. rgb[n][3], in place. The response has passed gn_response_check. Thread-safety:
+ * safe.
  */
 void gn_response_to_radiance(const struct gn_response *response, float *rgb, long n);
 /** The inverse: Rec.709 radiance to codes in [0, 1]. rgb[n][3], in place. */
