@@ -26,17 +26,27 @@ void gn_pose_to_matrix(const struct gn_pose *pose, double out_m[static 16]);
  * uniform scale within 10 % is dropped. Returns 0, or -EDOM and a reason (static string, may be
  * NULL) where m is not finite, mirrored (det < 0), singular or sheared (smallest singular value
  * < 0.9 of the largest), scaled by more than 10 %, or its last row is not 0 0 0 1.
+ * *out_pose is untouched then: the last good pose stays. The quaternion has w >= 0.
  */
 GN_MUST_USE int gn_pose_from_matrix(const double m[static 16], struct gn_pose *out_pose,
                                     const char **out_reason);
 
-/** Normalises the quaternion. -EDOM where it is not finite or its norm is outside [0.9, 1.1]. */
+/**
+ * Normalises the quaternion. -EDOM where it or the translation is not finite, or its norm is
+ * outside [0.9, 1.1].
+ */
 GN_MUST_USE int gn_pose_normalize(struct gn_pose *pose);
 
 /** out = a * b, i.e. first b, then a; out may alias a or b. */
 void gn_pose_multiply(const struct gn_pose *a, const struct gn_pose *b, struct gn_pose *out);
 /** out = the inverse motion; out may alias pose. */
 void gn_pose_invert(const struct gn_pose *pose, struct gn_pose *out);
+/**
+ * The motion a share t in [0, 1] of the way from a to b: spherical interpolation along the shorter
+ * arc (q and -q are one rotation), straight for the translation. out may alias a or b.
+ */
+void gn_pose_interpolate(const struct gn_pose *a, const struct gn_pose *b, double t,
+                         struct gn_pose *out);
 /** Rotates v by the pose's quaternion (no translation); out may alias v. */
 void gn_pose_rotate(const struct gn_pose *pose, const double v[static 3], double out[static 3]);
 /** Rotates and translates the point; out may alias p. */

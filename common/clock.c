@@ -1,0 +1,22 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "common/clock.h"
+
+#include <time.h>
+
+static int64_t get_ns(clockid_t clock)
+{
+    struct timespec now = {0};
+    clock_gettime(clock, &now); // cannot fail: both clocks are mandatory here
+    return (int64_t)now.tv_sec * GN_NS_PER_S + now.tv_nsec;
+}
+
+int64_t gn_clock_get_monotonic_ns(void)
+{
+    return get_ns(CLOCK_MONOTONIC);
+}
+
+int64_t gn_clock_get_realtime_ns(void)
+{
+    return get_ns(CLOCK_REALTIME);
+}
