@@ -20,8 +20,9 @@
 
 /** One raw capture, as it came in. Borrowed by gn_radiance_map_create. */
 struct gn_environment_frame {
-    const struct gn_image
-        *codes; // 1 or 3 channels: codes in [0, 1], or linear values (float frames)
+    const struct gn_image *codes; // 1, 3 or 4 channels (the 4th ignored): codes in [0, 1], or
+                                  // linear values (float frames)
+    bool has_rail; // codes come from an integer sensor format: 1 is its upper rail
     struct gn_projection projection;
     struct gn_response response;
     double world_from_probe[4]; // quaternion w, x, y, z
@@ -30,24 +31,35 @@ struct gn_environment_frame {
     uint64_t sequence;
 };
 
-/** What a frame had to have mended. */
+/** Largest radiance a map holds, W/(sr m^2): sums over any map stay far inside float. */
+#define GN_RADIANCE_MAX 1e30f
+
+/** What a frame had to have mended, and sums over the part it shows. */
 struct gn_radiance_map_figures {
     int n_nan, n_inf, n_negative; // texels with such a channel: set to 0, the neighbours' median, 0
-    int n_clipped;                // texels at the sensor's upper rail (integer formats)
+    int n_capped;                 // texels with a channel above GN_RADIANCE_MAX: set to it
+    int n_clipped;                // texels at the sensor's upper rail (has_rail frames)
     double mean_luminance;        // solid-angle weighted over the shown part, W/(sr m^2)
     double max_luminance;
+    double shown_solid_angle;   // sr
+    double shown_irradiance[3]; // sum over the shown part of L dOmega, W/m^2
 };
+
+struct gn_map_table; // server/light/map_table.h
 
 /** Thread-safety: immutable after create; shared (ref). */
 struct gn_radiance_map {
-    int references; // atomic
+    _Atomic int references;
+    struct gn_map_table *table; // shared (ref) by the maps of one stream
     struct gn_projection projection;
-    struct gn_image radiance; // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
-    float *solid_angle;       // [height][width] sr, 0 outside the valid circle; owned
-    float *direction_world;   // [height][width][3] unit, of the texels' centres; owned
+    struct gn_image radiance;     // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
+    const float *solid_angle;     // [height][width] sr, 0 outside the valid circle; the table's
+    const float *direction_world; // [height][width][3] unit, of the texels' centres (of texels cut
+                                  // by the circle: inside it); the table's
     struct gn_pose world_from_probe;
     bool is_full_sphere;
-    float fill[3]; // radiance of directions the map does not show (fisheye's lower half)
+    float fill[3];           // radiance of directions the map does not show (fisheye's lower half)
+    double fill_solid_angle; // sr, of those directions
     int64_t capture_time_ns;
     uint64_t sequence;
     struct gn_radiance_map_figures figures;
@@ -57,9 +69,16 @@ struct gn_radiance_map {
 struct gn_radiance_map_options {
     float ground_albedo; // of the fill below a fisheye's horizon, [0, 1], default 0.2 where 0
     bool no_fill;        // directions not shown are black
+    const struct gn_radiance_map *previous; // borrowed during the call, may be NULL: the last map
+                                            // of the stream. Where projection and orientation
+                                            // agree its table, and freed pixels, are used again
 };
 
-/** Linearises, sanitises and addresses the frame. Returns 0, -EINVAL and a sentence, -ENOMEM. */
+/**
+ * Linearises, sanitises and addresses the frame. Fill: every direction not shown has the radiance
+ * of a diffuse ground, albedo / pi times the irradiance that the shown part gives on a plane across
+ * the optical axis. Returns 0, -EINVAL and a sentence, -ENOMEM. Same bits whatever the pool's size.
+ */
 GN_MUST_USE int gn_radiance_map_create(const struct gn_environment_frame *frame,
                                        const struct gn_radiance_map_options *options,
                                        struct gn_pool *pool, struct gn_radiance_map **out_map,

@@ -10,13 +10,15 @@
 
 #include "server/light/radiance_map.h"
 
+struct gn_partition_plan; // server/light/partition_plan.h
+
 /** Most lights a state may hold. */
 #define GN_LIGHTS_MAX 4096
 
 /** A distant light. */
 struct gn_light {
     float dir_world[3];   // unit, towards the light
-    float angular_radius; // rad, 0: a point at infinity
+    float angular_radius; // rad, of the disc as spread out as the light's region; 0: unknown
     float irradiance[3];  // RGB at normal incidence, W/m^2
 };
 
@@ -35,30 +37,67 @@ enum gn_partition_metric {
     GN_METRIC_LOG2 = 3
 };
 
+/** Readings of the paper's partition that can be taken to the letter, one by one. */
+enum gn_partition_reading {
+    GN_READ_UNCLAMPED = 1 << 0,      // the number of sub-regions may pass max_ls
+    GN_READ_SAMPLE_MEAN = 1 << 1,    // means over the samples, not over the map
+    GN_READ_SAMPLE_MAX = 1 << 2,     // largest luminance: of the samples, not of the smoothed map
+    GN_READ_STRICT = 1 << 3,         // a region as bright as the mean gets no light
+    GN_READ_RADIUS_RINGS = 1 << 4,   // rings of equal polar angle, not of equal solid angle
+    GN_READ_MIDPOINT = 1 << 5,       // cut in the middle, not at the energy median
+    GN_READ_BRIGHTEST = 1 << 6,      // the brightest sample is the light, not energy and centroid
+    GN_READ_DISCARD_DARK = 1 << 7,   // dark regions (and the fill) give no light
+    GN_READ_PLAIN_SAMPLING = 1 << 8, // importance Y, not Y dOmega/dA
+    GN_READ_ALL = (1 << 9) - 1
+};
+
+/** n_lights of a caller who wants the metric's own count. */
+#define GN_LIGHTS_NO_AIM (-1)
+
 /** Options; all-zero is the default of the method. */
 struct gn_light_options {
     enum gn_light_method method;
-    int n_lights;  // wanted number where the method can aim, [1, GN_LIGHTS_MAX]; default 64
-    int rings;     // base division; default 4 (energy) or 8 (seed)
-    int sectors;   // default 12 (energy) or 24 (seed)
-    int max_ls;    // the paper's maxLS; default 8
-    int n_samples; // Penrose samples under the partition; default 16 per base region
+    int n_lights;  // wanted number where the method can aim (energy with log2, Penrose),
+                   // [1, GN_LIGHTS_MAX] or GN_LIGHTS_NO_AIM; default 64
+    int rings;     // base division of a hemisphere, [1, 64]; default 8 (seed), 4 (energy; follows
+                   // n_lights)
+    int sectors;   // [1, 256], rings * sectors <= 1024; default 24 (seed), 12 (energy; as above)
+    int max_ls;    // the paper's maxLS, [1, 4096]; default 8, at least n_lights / 8 (energy)
+    int n_samples; // Penrose samples under the partition, [1, 2^20]; default 16 per base region
     enum gn_partition_metric metric; // default log2 (energy) or 2^k (seed)
-    bool no_sh;                      // leave the SH irradiance out
+    unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)
+    unsigned mended;  // GN_READ_* not taken to the letter after all
+    bool no_sh;       // leave the SH irradiance out
+    const struct gn_lighting_state *previous; // borrowed during the call, may be NULL: the last
+                                              // state of the stream, whose tables are used again
+};
+
+/** What the method found. */
+struct gn_light_figures {
+    int rings, sectors; // base division of the part shown; 0 where the method has none
+    int n_samples;      // Penrose samples drawn
+    int n_bright;       // base regions with lights of their own
+    int n_dark_lights;  // lights of merged dark regions
+    int n_fill_lights;  // lights of the directions not shown
+    int n_dropped;      // lights left out, the weakest, beyond GN_LIGHTS_MAX
+    double split_gain;  // factor on MLR/MLEM by which the wanted number was met; 1: none
 };
 
 /** Published by the light thread, read by all. Thread-safety: immutable after create; shared (ref).
  */
 struct gn_lighting_state {
-    int references;              // atomic
+    _Atomic int references;
     struct gn_radiance_map *map; // shared (ref), never NULL
     bool has_sh;
     double sh[9][3]; // L_lm of the radiance in world axes, order 00 1-1 10 11 2-2 2-1 20 21 22
     int n_lights;
-    struct gn_light *lights; // [n_lights], owned; by falling luminance
-    double
-        total_irradiance[3]; // sum over map of L dOmega, W/m^2 (what the lights should add up to)
-    uint64_t sequence;       // of the environment frame
+    struct gn_light *lights;    // [n_lights], owned; by falling luminance
+    double total_irradiance[3]; // sum over the sphere, fill included, of L dOmega, W/m^2: what
+                                // the lights add up to (seed: they do not)
+    struct gn_light_figures figures;
+    struct gn_partition_plan *plan; // which texel lies in which base region; shared (ref), may be
+                                    // NULL
+    uint64_t sequence;              // of the environment frame
     int64_t capture_time_ns;
     int64_t published_time_ns;
     double ms_map, ms_sh, ms_lights; // time spent, ms
