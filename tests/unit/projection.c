@@ -1,0 +1,248 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Projections: which way each one looks, both ways, and what they refuse. */
+#include "common/projection.h"
+
+#include <errno.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "proto/attr.h"
+
+static const double pi = 3.14159265358979323846;
+
+static struct gn_projection make(enum gn_projection_type type, int width, int height)
+{
+    struct gn_projection p = {.type = type, .width = width, .height = height};
+    if (type == GN_PROJECTION_FISHEYE_KANNALA_BRANDT)
+        memcpy(p.k, (double[4]){0.05, -0.02, 0.004, -0.0005}, sizeof(p.k));
+    const char *reason = NULL;
+    if (gn_projection_init(&p, &reason))
+        fail_msg("%s: %s", gn_projection_get_name(type), reason);
+    return p;
+}
+
+static void assert_direction(const struct gn_projection *p, double x, double y, double dx,
+                             double dy, double dz)
+{
+    double d[3], xy[2];
+    assert_true(gn_projection_get_direction(p, x, y, d));
+    double error = hypot(hypot(d[0] - dx, d[1] - dy), d[2] - dz);
+    if (!(error < 1e-12))
+        fail_msg("%s at %g, %g looks along %g %g %g, not %g %g %g", gn_projection_get_name(p->type),
+                 x, y, d[0], d[1], d[2], dx, dy, dz);
+    assert_true(gn_projection_get_position(p, d, xy));
+    assert_true(hypot(xy[0] - x, xy[1] - y) < 1e-6);
+}
+
+/* Fisheyes and angular maps: x right, y down, z in the middle. */
+static void test_radial_axes(void **state)
+{
+    (void)state;
+    for (int t = GN_PROJECTION_ANGULAR; t < GN_PROJECTION_COUNT; t++) {
+        if (t == GN_PROJECTION_MIRRORBALL)
+            continue;
+        struct gn_projection p = make((enum gn_projection_type)t, 300, 200);
+        double side = t == GN_PROJECTION_ANGULAR ? 50 : 100; // px where theta is pi/2
+        assert_direction(&p, 150, 100, 0, 0, 1);
+        assert_direction(&p, 150 + side, 100, 1, 0, 0);
+        assert_direction(&p, 150 - side, 100, -1, 0, 0);
+        assert_direction(&p, 150, 100 + side, 0, 1, 0);
+        assert_direction(&p, 150, 100 - side, 0, -1, 0);
+    }
+}
+
+/* Mirror ball: x right, y up; the middle reflects +z, r = R sin(45 deg) the equator. */
+static void test_mirrorball_axes(void **state)
+{
+    (void)state;
+    struct gn_projection p = make(GN_PROJECTION_MIRRORBALL, 200, 200);
+    double side = 100 * sqrt(0.5), d[3];
+    assert_direction(&p, 100, 100, 0, 0, 1);
+    assert_direction(&p, 100 + side, 100, 1, 0, 0);
+    assert_direction(&p, 100, 100 - side, 0, 1, 0);
+    assert_direction(&p, 100, 100 + side, 0, -1, 0);
+    assert_true(gn_projection_get_direction(&p, 100, 200, d));
+    assert_true(d[2] < -1 + 1e-12); // the rim shows -z
+    /* The law of reflection: n is halfway between the direction to the camera, +z, and d. */
+    double u = 0.3, v = -0.6, n[3] = {u, v, sqrt(1 - u * u - v * v)};
+    assert_direction(&p, 100 + 100 * u, 100 - 100 * v, 2 * n[2] * n[0], 2 * n[2] * n[1],
+                     2 * n[2] * n[2] - 1);
+}
+
+static void test_latlong_axes(void **state)
+{
+    (void)state;
+    struct gn_projection p = make(GN_PROJECTION_LATLONG, 400, 200);
+    double d[3], xy[2];
+    assert_direction(&p, 200, 100, 1, 0, 0);
+    assert_direction(&p, 300, 100, 0, -1, 0);
+    assert_direction(&p, 100, 100, 0, 1, 0);
+    assert_direction(&p, 0, 100, -1, 0, 0);
+    assert_true(gn_projection_get_direction(&p, 17, 0, d));
+    assert_true(d[2] == 1);
+    assert_true(gn_projection_get_direction(&p, 17, 200, d));
+    assert_true(d[2] == -1);
+    /* phi = -pi and phi = pi are one direction, one position, inside the picture. */
+    assert_true(gn_projection_get_position(&p, (double[3]){-1, -0.0, 0}, xy));
+    assert_true(xy[0] == 0);
+}
+
+/* Every model's radius at 60 degrees, from its formula. */
+static void test_radius_of_models(void **state)
+{
+    (void)state;
+    static const struct {
+        enum gn_projection_type type;
+        double r; // px, where the radius at theta_max is 100
+    } cases[] = {
+        {GN_PROJECTION_ANGULAR, 33.333333333333333},
+        {GN_PROJECTION_MIRRORBALL, 50},
+        {GN_PROJECTION_FISHEYE_EQUIDISTANT, 66.666666666666667},
+        {GN_PROJECTION_FISHEYE_EQUISOLID, 70.710678118654752},
+        {GN_PROJECTION_FISHEYE_ORTHOGRAPHIC, 86.602540378443865},
+        {GN_PROJECTION_FISHEYE_STEREOGRAPHIC, 57.735026918962576},
+    };
+    double d[3] = {sin(pi / 3), 0, cos(pi / 3)}, xy[2];
+    for (size_t i = 0; i < GN_ARRAY_LEN(cases); i++) {
+        struct gn_projection p = make(cases[i].type, 200, 200);
+        assert_true(gn_projection_get_position(&p, d, xy));
+        assert_true(fabs(xy[0] - 100 - cases[i].r) < 1e-9);
+    }
+    struct gn_projection p = {.type = GN_PROJECTION_FISHEYE_KANNALA_BRANDT,
+                              .width = 200,
+                              .height = 200,
+                              .focal = 50,
+                              .k = {0.05, -0.02, 0.004, -0.0005}};
+    assert_int_equal(gn_projection_init(&p, NULL), 0);
+    double t = pi / 3, r = 50 * (t + 0.05 * pow(t, 3) - 0.02 * pow(t, 5) + 0.004 * pow(t, 7) -
+                                 0.0005 * pow(t, 9));
+    assert_true(gn_projection_get_position(&p, d, xy));
+    assert_true(fabs(xy[0] - 100 - r) < 1e-9);
+}
+
+/* Direction to position to direction within 1e-6 rad inside 0.999 R; both ways at random. */
+static void test_round_trip(void **state)
+{
+    (void)state;
+    uint64_t seed = 1;
+    for (int t = 0; t < GN_PROJECTION_COUNT; t++) {
+        struct gn_projection p = make((enum gn_projection_type)t, 512, 256);
+        for (int i = 0; i < 20000; i++) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            double x = (double)(seed >> 40) / (1 << 24) * 512;
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            double y = (double)(seed >> 40) / (1 << 24) * 256, d[3], e[3], xy[2];
+            bool inside = t == GN_PROJECTION_LATLONG || hypot(x - 256, y - 128) < 0.999 * p.radius;
+            if (!inside)
+                continue;
+            assert_true(gn_projection_get_direction(&p, x, y, d));
+            assert_true(fabs(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1) < 1e-12);
+            assert_true(gn_projection_get_position(&p, d, xy));
+            assert_true(gn_projection_get_direction(&p, xy[0], xy[1], e));
+            assert_true(hypot(hypot(d[0] - e[0], d[1] - e[1]), d[2] - e[2]) < 1e-6);
+        }
+    }
+}
+
+static void test_outside(void **state)
+{
+    (void)state;
+    double d[3] = {7, 7, 7}, xy[2] = {7, 7};
+    struct gn_projection p = make(GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200);
+    assert_false(gn_projection_get_direction(&p, 1, 1, d)); // a corner
+    assert_false(gn_projection_get_direction(&p, NAN, 100, d));
+    assert_false(gn_projection_get_direction(&p, 100, -0.1, d));
+    assert_false(gn_projection_get_position(&p, (double[3]){0, 0, -1}, xy));
+    assert_false(gn_projection_get_position(&p, (double[3]){NAN, 0, 1}, xy));
+    assert_true(d[0] == 7 && xy[0] == 7);
+    assert_true(gn_projection_get_solid_angle(&p, 0, 0) == 0);
+    assert_false(gn_projection_is_full_sphere(&p));
+    struct gn_projection angular = make(GN_PROJECTION_ANGULAR, 300, 200);
+    assert_true(gn_projection_is_full_sphere(&angular));
+    assert_true(gn_projection_get_position(&angular, (double[3]){0, 0, -1}, xy));
+    assert_true(fabs(xy[0] - 250) < 1e-9 && fabs(xy[1] - 100) < 1e-9);
+    angular = (struct gn_projection){
+        .type = GN_PROJECTION_ANGULAR, .width = 300, .height = 200, .center = {50, 100}};
+    assert_int_equal(gn_projection_init(&angular, NULL), 0);
+    assert_false(gn_projection_is_full_sphere(&angular)); // cut at the left
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    enum gn_projection_type fisheye = GN_PROJECTION_FISHEYE_EQUIDISTANT;
+    enum gn_projection_type kb = GN_PROJECTION_FISHEYE_KANNALA_BRANDT;
+    const struct {
+        struct gn_projection p;
+        const char *word; // of the reason
+    } cases[] = {
+        {{.type = GN_PROJECTION_COUNT, .width = 8, .height = 8}, "unknown"},
+        {{.type = fisheye, .width = 0, .height = 8}, "sides"},
+        {{.type = fisheye, .width = 16384, .height = 16384}, "pixels"},
+        {{.type = fisheye, .width = 8, .height = 8, .theta_max = 3.2}, "theta_max"},
+        {{.type = fisheye, .width = 8, .height = 8, .theta_max = NAN}, "theta_max"},
+        {{.type = fisheye, .width = 8, .height = 8, .radius = -1}, "radius"},
+        {{.type = fisheye, .width = 8, .height = 8, .radius = NAN}, "radius"},
+        {{.type = fisheye, .width = 8, .height = 8, .radius = 1e9}, "radius"},
+        {{.type = fisheye, .width = 8, .height = 8, .radius = 4, .focal = 4}, "contradict"},
+        {{.type = fisheye, .width = 8, .height = 8, .center = {-9, 4}}, "outside"},
+        {{.type = fisheye, .width = 8, .height = 8, .center = {NAN, 4}}, "outside"},
+        {{.type = GN_PROJECTION_FISHEYE_ORTHOGRAPHIC, .width = 8, .height = 8, .theta_max = 1.6},
+         "orthographic"},
+        {{.type = GN_PROJECTION_FISHEYE_STEREOGRAPHIC,
+          .width = 8,
+          .height = 8,
+          .theta_max = 3.1415},
+         "stereographic"},
+        {{.type = kb, .width = 8, .height = 8, .k = {-0.2}}, "rise"},
+        {{.type = kb, .width = 8, .height = 8, .k = {0, 0, 0, INFINITY}}, "rise"},
+        /* Falls only in the middle: slope 1 - 3 s + 2.2 s^2 < 0 around s = 0.68. */
+        {{.type = kb, .width = 8, .height = 8, .k = {-1, 0.44}}, "rise"},
+    };
+    for (size_t i = 0; i < GN_ARRAY_LEN(cases); i++) {
+        struct gn_projection p = cases[i].p;
+        const char *reason = "";
+        assert_int_equal(gn_projection_init(&p, &reason), -EINVAL);
+        if (!strstr(reason, cases[i].word))
+            fail_msg("case %zu: \"%s\" does not say \"%s\"", i, reason, cases[i].word);
+        assert_memory_equal(&p, &cases[i].p, sizeof(p));
+    }
+    /* Slope 1 - 3 s + 2.3 s^2 stays above 0.02: accepted. Twice is as once. */
+    struct gn_projection p = {.type = kb, .width = 8, .height = 8, .k = {-1, 0.46}};
+    assert_int_equal(gn_projection_init(&p, NULL), 0);
+    struct gn_projection q = p;
+    assert_int_equal(gn_projection_init(&q, NULL), 0);
+    assert_memory_equal(&p, &q, sizeof(p));
+}
+
+static void test_names(void **state)
+{
+    (void)state;
+    for (int t = 0; t < GN_PROJECTION_COUNT; t++) {
+        enum gn_projection_type type = GN_PROJECTION_COUNT;
+        const char *name = gn_projection_get_name((enum gn_projection_type)t);
+        assert_int_equal(gn_projection_from_name(name, &type), 0);
+        assert_int_equal(type, t);
+    }
+    enum gn_projection_type type;
+    assert_int_equal(gn_projection_from_name("fisheye", &type), -EINVAL);
+    assert_null(gn_projection_get_name(GN_PROJECTION_COUNT));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_radial_axes),  cmocka_unit_test(test_mirrorball_axes),
+        cmocka_unit_test(test_latlong_axes), cmocka_unit_test(test_radius_of_models),
+        cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_outside),
+        cmocka_unit_test(test_refusals),     cmocka_unit_test(test_names),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
