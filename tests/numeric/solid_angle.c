@@ -120,8 +120,13 @@ static double get_share(const struct gn_projection *p, int x, int y, const doubl
 {
     static const double cos_disc = 1 - 1 / (2 * 3.14159265358979323846);
     int n_in = 0, n_shown = 0;
+    double d[3];
+    if (gn_projection_get_direction(p, x + 0.5, y + 0.5, d)) {
+        double cos_light = d[0] * l[0] + d[1] * l[1] + d[2] * l[2];
+        if (fabs(cos_light - cos_disc) > 0.1) // far from the disc's border
+            return cos_light > cos_disc;
+    }
     for (int s = 0; s < 16; s++) {
-        double d[3];
         if (!gn_projection_get_direction(p, x + (s % 4 + 0.5) / 4, y + (s / 4 + 0.5) / 4, d))
             continue;
         n_shown++;
