@@ -93,9 +93,9 @@ struct gn_envelope gn_conn_get_envelope(const struct gn_conn *conn);
 
 /**
  * Queue a message; gn_conn_flush() writes it. payload: may be NULL; one more reference is taken,
- * kept until it is written. Returns 0, -ENOBUFS (the queue's bound would be passed: nothing is
- * queued; drop something or the peer), -ENOMEM, or what gn_wire_encode() returns (out_fault, may be
- * NULL, says why).
+ * kept until it is written. Returns 0, -EPIPE (after gn_conn_drop_queued()), -ENOBUFS (the queue's
+ * bound would be passed: nothing is queued; drop something or the peer), -ENOMEM, or what
+ * gn_wire_encode() returns (out_fault, may be NULL, says why).
  */
 GN_MUST_USE int gn_conn_send(struct gn_conn *conn, uint16_t type, const void *msg,
                              struct gn_buf *payload, struct gn_wire_fault *out_fault);
@@ -108,6 +108,12 @@ size_t gn_conn_get_queued_bytes(const struct gn_conn *conn);
 
 /** Messages queued and not wholly written. */
 size_t gn_conn_get_queued_messages(const struct gn_conn *conn);
+
+/**
+ * Give back all that is queued, for good. Where a message was half written the stream is out of
+ * step, and every later send returns -EPIPE.
+ */
+void gn_conn_drop_queued(struct gn_conn *conn);
 
 /** The plain socket, for poll or epoll; -1 with another io. */
 int gn_conn_get_fd(const struct gn_conn *conn);
