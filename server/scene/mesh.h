@@ -35,8 +35,13 @@ void gn_mesh_finish(struct gn_mesh *mesh);
 GN_MUST_USE int gn_mesh_check(struct gn_mesh *mesh, int *out_dropped, struct gn_error *out_error);
 
 /**
- * Reads all triangles of the file into one mesh, node transforms applied, diffuse colours of its
- * materials in albedos. Returns 0 or a negative errno and a sentence naming the file.
+ * Reads all triangles of an OBJ, glTF 2.0 (.gltf, .glb) or PLY file into one mesh, polygons cut
+ * into triangles, node transforms applied, points and lines left out. Normals are the file's own,
+ * and where it has none the mesh is flat: nothing is smoothed by guess. Unusable normals (zero, not
+ * finite) become the mean of their triangles'. Albedos are the materials' diffuse or base colours,
+ * taken as linear Rec.709; NULL where the file has no material. Textures and vertex colours are not
+ * read. Returns 0 or a negative errno and a sentence naming the file: not finite, empty, too large,
+ * a colour outside [0, 1], a kind of file that is not read.
  */
 GN_MUST_USE int gn_mesh_read_file(const char *path, struct gn_mesh *out_mesh,
                                   struct gn_error *out_error);
