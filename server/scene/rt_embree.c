@@ -1,14 +1,11 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#define _GNU_SOURCE // sched_getaffinity: what Embree itself counts
 #include "server/scene/rt.h"
 
 #include <assert.h>
 #include <errno.h>
 #include <float.h>
 #include <math.h>
-#include <pthread.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -17,6 +14,8 @@
 #else
 #include <embree3/rtcore.h>
 #endif
+
+#include "common/thread.h"
 
 // Meshes a scene may hold; geometry ids are indices of gn_rt.meshes.
 #define MAX_MESHES (1 << 20)
@@ -45,21 +44,10 @@ struct gn_rt {
 
 /* One device for the process: its threads and its memory are shared by all scenes. */
 static struct {
-    pthread_mutex_t mu;
+    struct gn_mutex mu;
     RTCDevice device; // guarded by mu; one reference each gn_rt
     int users;        // guarded by mu
-} shared = {.mu = PTHREAD_MUTEX_INITIALIZER};
-
-/** Processors this process may run on, as Embree's task system counts them; 1 where unknown. */
-static int count_processors(void)
-{
-    cpu_set_t set;
-    CPU_ZERO(&set);
-    if (sched_getaffinity(0, sizeof(set), &set) != 0)
-        return 1;
-    int n = CPU_COUNT(&set);
-    return n > 0 ? n : 1;
-}
+} shared = {.mu = {.pthread = PTHREAD_MUTEX_INITIALIZER}};
 
 static const char *name_error(enum RTCError error)
 {
@@ -91,29 +79,29 @@ static int check_device(RTCDevice device, const char *what, struct gn_error *out
 
 static RTCDevice acquire_device(void)
 {
-    pthread_mutex_lock(&shared.mu);
+    gn_mutex_lock(&shared.mu);
     if (shared.users == 0) {
         // Embree starts no threads of its own: those that build a tree are ours, and join.
         char config[64];
-        int n = count_processors();
+        int n = gn_thread_get_cpu_count();
         (void)snprintf(config, sizeof(config), "threads=%d,user_threads=%d", n, n);
         shared.device = rtcNewDevice(config);
     }
     if (shared.device)
         shared.users++;
     RTCDevice device = shared.device;
-    pthread_mutex_unlock(&shared.mu);
+    gn_mutex_unlock(&shared.mu);
     return device;
 }
 
 static void release_device(void)
 {
-    pthread_mutex_lock(&shared.mu);
+    gn_mutex_lock(&shared.mu);
     if (--shared.users == 0) {
         rtcReleaseDevice(shared.device);
         shared.device = NULL;
     }
-    pthread_mutex_unlock(&shared.mu);
+    gn_mutex_unlock(&shared.mu);
 }
 
 int gn_rt_create(struct gn_rt **out_rt, struct gn_error *out_error)
@@ -306,7 +294,7 @@ int gn_rt_commit(struct gn_rt *rt, struct gn_pool *pool, struct gn_error *out_er
 {
     // A thread more than Embree has slots for would wait inside for ever.
     int n_threads = pool ? gn_pool_get_size(pool) : 1;
-    int n_processors = count_processors();
+    int n_processors = gn_thread_get_cpu_count();
     if (n_threads > n_processors)
         n_threads = n_processors;
     for (int i = 0; i < 3; i++) {
