@@ -93,12 +93,12 @@ uint32_t gn_rt_get_occluded16(const struct gn_rt *rt, enum gn_rt_set set,
  * Moves a hit point off its surface, by the hit's clearance along the geometric normal, to the side
  * that `toward` points to: far enough that a new ray does not meet the same surface, not farther.
  *   clearance = 2^-23 (4 max|p| + 16 max|v_i - p|), |.| the largest coordinate
- * bounds what rounds: the point and the new origin themselves (half an ulp of p for each
- * coordinate, twice), and the tracer's own v_i - origin and their products (a few ulp of the
- * triangle's size). It needs no constant length, so it holds for a scene of any size anywhere;
- * steps that know only the point (Waechter and Binder, Ray Tracing Gems, 2019, chapter 6) fail
- * where the triangle is large beside its distance from the origin, and lift 1/65536 m near it.
- * Checked by tests/numeric/rt_offset.c.
+ * bounds what rounds: the point and the new origin (half an ulp of each coordinate, twice), and the
+ * tracer's own v_i - origin and their products (a few ulp of the triangle's size). It holds no
+ * constant length, so it fits a scene of any size anywhere. Steps that know only the point
+ * (Waechter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
+ * Gems, 2019, chapter 6) avoid acne as well, but lift by 1/65536 m near the origin: 1.5 % of an
+ * object of a millimetre. Checked by tests/numeric/rt_offset.c.
  */
 void gn_rt_offset_origin(const float point[static 3], const float normal[static 3], float clearance,
                          const float toward[static 3], float out_org[static 3]);

@@ -16,6 +16,8 @@
 
 /** Most objects a manifest may list. */
 #define GN_SCENE_MAX_OBJECTS 4096
+/** Most triangles of either role. */
+#define GN_SCENE_MAX_TRIANGLES (1 << 27)
 
 enum gn_material_type { GN_MATERIAL_DIFFUSE = 0, GN_MATERIAL_MIRROR = 1 };
 
@@ -46,9 +48,16 @@ struct gn_scene {
 };
 
 /**
- * Reads scene.json of docs/frames.md (paths relative to it), all meshes, and commits. An unknown
- * key, role or material type, a missing mesh, a singular matrix, a light list (not built yet) is
- * refused with the file, the place and what would be right. A scene without objects is an error.
+ * Reads scene.json (docs/frames.md) and all meshes, and commits:
+ *   {"objects": [{"mesh": "a.obj", "role": "virtual" or "real", "name": "a",
+ *                 "material": {"type": "diffuse" or "mirror", "albedo": [r, g, b]},
+ *                 "world_from_object": [16 numbers, row-major]}], "lights": []}
+ * Only mesh and role must be there. Paths are relative to the file. Without a material, or with a
+ * diffuse one without albedo, the mesh's own colours count, or 0.5; a mirror's albedo is 1 unless
+ * said. The matrix may scale, shear and mirror; absent, it is the identity. An unknown key, role or
+ * material, a missing mesh, a singular matrix, a list of lights (not built yet), a scene without
+ * objects is refused with the file, the place and what would be right. Returns 0 or a negative
+ * errno.
  */
 GN_MUST_USE int gn_scene_read_file(const char *path, struct gn_pool *pool,
                                    struct gn_scene **out_scene, struct gn_error *out_error);
@@ -69,15 +78,14 @@ struct gn_surface {
     float point[3];            // m, world
     float clearance;           // m, for gn_rt_offset_origin
     float normal_geometric[3]; // unit, turned to the side the ray came from
-    float normal_shading[3];   // unit, interpolated; same side
+    float normal_shading[3];   // unit, interpolated; to the geometric normal's side
     float albedo[3];
     enum gn_material_type material;
     enum gn_rt_set role;
 };
 
-/** Evaluates a hit of a ray with unit direction dir from org. Thread-safety: safe. */
-void gn_scene_get_surface(const struct gn_scene *scene, const float org[static 3],
-                          const float dir[static 3], const struct gn_rt_hit *hit,
-                          struct gn_surface *out_surface);
+/** Evaluates a hit of a ray with unit direction dir. Thread-safety: safe. */
+void gn_scene_get_surface(const struct gn_scene *scene, const float dir[static 3],
+                          const struct gn_rt_hit *hit, struct gn_surface *out_surface);
 
 #endif
