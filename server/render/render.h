@@ -22,32 +22,44 @@ enum gn_quality {
     GN_QUALITY_REFERENCE = 2, // every texel, exact visibility: slow, the judge of the others
 };
 
-/** How diffuse virtual objects are lit: the paper's two variants. */
+/**
+ * How diffuse virtual objects are lit: the paper's two variants, the lights with shadow rays or the
+ * SH irradiance of the normal. REFERENCE integrates the map whatever is asked for here.
+ */
 enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE_MAP = 1 };
 
 /** All-zero is the default of the quality. */
 struct gn_render_options {
     enum gn_quality quality;
     enum gn_shading shading;
-    bool no_shadow;               // leave the shadow on real surfaces out
-    bool shadow_unweighted;       // the paper's sums without the cosine (SEED implies it)
-    bool shadow_ignore_real;      // real blockers do not count in the sums (SEED implies it)
-    bool all_passes;              // switch every omission of the plan off (for tests)
-    int bounces;                  // reference only: indirect bounces, [0, 16]
-    int samples_per_texel_bounce; // reference only, paths per pixel where bounces > 0; default 256
-    uint64_t seed;                // of the reference's random paths
+    bool no_shadow;          // leave the shadow on real surfaces out
+    bool shadow_unweighted;  // the paper's sums without the cosine (SEED implies it)
+    bool shadow_ignore_real; // real blockers do not count in the sums (SEED implies it)
+    bool all_passes;         // switch every omission of the plan off (for tests)
+    bool supersample_all;    // every pixel gets its quality's grid (to test the choice of them)
+    int bounces;             // reference only: indirect bounces, [0, 16]
+    int paths_per_pixel;     // reference with bounces: random paths, [1, 65536], default 256
+    uint64_t seed;           // of the reference's random paths
 };
 
-/** The picture's layers; linear radiance. Thread-safety: unsafe; sized once, reused frame by frame.
+/**
+ * The picture's layers; linear radiance. With B the radiance that the modelled real scene sends to
+ * the pixel without the virtual objects, C the part of B whose light paths no virtual object cuts,
+ * and T the radiance with the virtual objects in the scene: shadow = C / B, added = T - C. So
+ * shadow * background + added tends to the truth as background tends to B; without bounces C / B is
+ * the paper's 1 - ShadowColor / UnShadowColor and added is 0.
+ * Thread-safety: unsafe; sized once, reused frame by frame.
  */
 struct gn_layers {
     int width, height;
     struct gn_image virtual_rgba; // [h][w][4], premultiplied linear radiance, coverage
     struct gn_image shadow;       // [h][w][3], [0, 1]
-    struct gn_image added;        // [h][w][3], linear radiance per unit of albedo-true light, >= 0
-    struct gn_image depth; // [h][w][1], m along the camera's z, INFINITY where nothing is hit
+    struct gn_image added;        // [h][w][3], linear radiance by the manifest's albedos, >= 0
+    struct gn_image depth; // [h][w][1], m along the camera's z at the pixel's centre, or INFINITY
 };
+/** Allocates. Returns 0, -EINVAL (a side out of range), -ENOMEM; *layers is zeroed on failure. */
 GN_MUST_USE int gn_layers_init(struct gn_layers *layers, int width, int height);
+/** Frees and zeroes. A zeroed one is fine. */
 void gn_layers_finish(struct gn_layers *layers);
 
 /** Most passes a plan lists. */
@@ -64,11 +76,18 @@ struct gn_plan_entry {
 struct gn_render_report {
     int n_plan;
     struct gn_plan_entry plan[GN_PLAN_MAX];
-    double ms_plan, ms_primary, ms_shade, ms_shadow, ms_total;
-    uint64_t rays_primary, rays_shade, rays_shadow, rays_mirror;
-    int n_lights;
-    double estimated_error; // of the shadow factor, RMS over the affected pixels; < 0: not known
+    double ms_plan, ms_total;               // wall time
+    double ms_primary, ms_shade, ms_shadow; // the workers' time in the pass / number of workers
+    uint64_t rays_primary, rays_mirror;     // nearest-hit rays: through pixels, after mirrors
+    uint64_t rays_shade, rays_shadow;       // visibility rays (and, with bounces, path segments)
+    int n_lights;                           // lights used; reference: directions of the map used
+    /**
+     * Of the shadow factor, RMS over the affected pixels and channels; < 0: not known. Half the
+     * difference between the factors that the even and the odd lights give: as rough as that is.
+     */
+    double estimated_error;
     int64_t n_virtual_pixels, n_shadow_pixels; // pixels with coverage > 0, with a factor < 1
+    int64_t n_refined_pixels;                  // pixels that got more than their centre's ray
 };
 
 /** Keeps what frames share (scratch memory per size). Thread-safety: unsafe (one frame at a time).
@@ -81,7 +100,10 @@ GN_MUST_USE int gn_renderer_create(const struct gn_scene *scene, struct gn_pool 
 void gn_renderer_destroy(struct gn_renderer **renderer);
 
 /**
- * Renders one view. layers must have been made by gn_layers_init; it is resized where its size
+ * Renders one view. One ray goes through each pixel's centre; pixels at edges get a grid of rays
+ * (render/refine.c has the rule and the table of grids). A pixel's shadow factor is the ratio of
+ * its rays' sums, so that an edge between two real surfaces weighs them by the light they send.
+ * layers must have been made by gn_layers_init; it is resized where its size
  * differs from the camera's (the only allocation; none while the size stays). Same bits whatever
  * the pool's size. Returns 0, -EINVAL and a sentence, -ENOMEM.
  */

@@ -1,0 +1,253 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What the passes of one frame share. A frame goes through in tiles; a tile's samples go through in
+ * batches: primary.c finds what each sees, shade.c and shadow.c (or reference.c for both) find its
+ * light, refine.c says which pixels need more samples, layers.c makes pixels of samples.
+ * A frame is const while the workers run; each worker owns one scratch. Sums are in double and in
+ * the order of the lights, so the bits do not depend on the number of workers.
+ */
+#ifndef GN_SERVER_RENDER_INTERNAL_H
+#define GN_SERVER_RENDER_INTERNAL_H
+
+#include "server/render/render.h"
+
+/** Side of a tile, px. */
+#define TILE 16
+/** Most samples of a batch. */
+#define BATCH (TILE * TILE)
+/** Mirrors a ray may meet one after another; after that it takes the map's radiance. */
+#define MIRROR_DEPTH 8
+/** Words of a bit set with one bit for each light. */
+#define LIGHT_WORDS (GN_LIGHTS_MAX / 64)
+
+enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
+
+/** One camera ray and what becomes of it. */
+struct sample {
+    int group;     // the pixel of the batch it belongs to
+    uint64_t seed; // of its random paths
+    float dir[3];  // unit, world
+    float dir_z;   // its component along the camera's z; 0: the camera has no ray here
+
+    enum sample_kind kind;
+    uint32_t object; // where kind is not NOTHING
+    float depth;     // m along the camera's z
+    struct gn_surface surface;
+    float org[3]; // of rays that leave the surface: its point, moved off it
+
+    // Virtual: what is seen after mirrors: a diffuse surface, or the environment's radiance.
+    bool is_lit;        // surface, org are of a diffuse surface that shading has to light
+    float through[3];   // share of its radiance that reaches the camera
+    double radiance[3]; // virtual: what the camera sees, W/(sr m^2)
+    double indirect[3]; // the part of it that came by bounces
+
+    // Real: radiance without the virtual objects (B of render.h), what they cut off it (B - C),
+    // what they add (T - C). open and cut: the sums U and S over even and odd lights, W/m^2.
+    bool is_receiver; // a diffuse real surface
+    bool is_cut;      // some light is cut off by a virtual object
+    bool is_summed;   // base and lost are known
+    double open[2][3], cut[2][3];
+    double base[3], lost[3], gain[3];
+};
+
+/** Directions that carry light, in structure-of-arrays form. */
+struct light_list {
+    int n, capacity;
+    float *dir[3];        // unit, world
+    float *irradiance[3]; // at normal incidence, W/m^2
+    double total[3];      // sum of irradiance
+    double *cdf;          // [n] of luminance, rising to 1; the reference's choice of lights
+};
+
+/** A box for conservative tests, m. */
+struct box {
+    float min[3], max[3];
+};
+
+/** How a quality chooses the pixels that get a grid of rays. */
+struct refine_rule {
+    int grid;       // rays per side; 1: none
+    float radiance; // second difference between virtual neighbours, relative to their larger one
+    float shadow;   // second difference of the shadow factor
+};
+
+/** A pixel's centre, as the choice of pixels to refine sees it. */
+struct feature {
+    uint32_t owner; // virtual object's id + 1, 0: none
+    float color[3]; // its radiance, or the shadow factor
+};
+
+/** What one worker needs for a batch, and its counts. */
+struct scratch {
+    struct sample samples[BATCH];
+    int lit[BATCH];                       // indices of samples that a pass works on
+    uint64_t blocked[BATCH][LIGHT_WORDS]; // per such sample: lights that virtual objects hide
+    struct gn_rt_packet packet;
+    int lane_sample[GN_RT_PACKET];
+    int lane_light[GN_RT_PACKET];
+    float lane_weight[GN_RT_PACKET];
+    int n_lanes;
+    uint64_t *texel_blocked; // [texel words], reference
+    int n_texel_words;
+};
+
+/** What one tile adds to the report; summed in the order of tiles. */
+struct tile_figures {
+    double s_primary, s_shade, s_shadow;
+    uint64_t rays_primary, rays_mirror, rays_shade, rays_shadow;
+    uint64_t n_mirrors, n_lit, n_receivers, n_rays_real;
+    double error_sum;
+    int64_t error_n;
+    int64_t n_virtual_pixels, n_shadow_pixels, n_refined_pixels;
+};
+
+/** One frame, const while the workers run. */
+struct frame {
+    const struct gn_scene *scene;
+    const struct gn_rt *rt;
+    const struct gn_camera *camera;
+    const struct gn_lighting_state *state;
+    struct gn_render_options options;
+    struct refine_rule rule;
+    double world_from_camera[9]; // rotation, row-major
+    float origin[3];             // the camera, world
+    const float *rays;           // [h][w][3] of pixel centres, camera frame; z 0: none
+    bool has_real, has_virtual;
+    struct box real_box, virtual_box; // the virtual one widened against rounding
+    const struct light_list *lights;  // seed, interactive: the state's; reference: the map's
+    double floor_irradiance[3];       // sums up to this are no light (1e-6 of all)
+    float floor_radiance;             // radiances below this do not make contrast
+
+    // The plan: what runs.
+    bool run_shadow;   // shadow on real surfaces
+    bool run_blockers; // real geometry may hide lights from real surfaces
+    bool run_bounces;
+    bool cull; // leave out rays that cannot meet the virtual objects
+
+    struct gn_layers *layers;
+    struct feature *features;     // [h][w]
+    struct tile_figures *figures; // [n_tiles]
+    struct scratch *scratches;    // [n_workers]
+    int tiles_x, tiles_y;
+};
+
+/* plan.c */
+
+/** Decides what runs, and writes the plan's lines into the report. slopes: bounds of the camera's
+ * rays, x/z and y/z: min x, max x, min y, max y. */
+void gn_plan_make(struct frame *frame, const double slopes[static 4],
+                  struct gn_render_report *report);
+/** After the frame: passes that found nothing to do did not run. */
+void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
+                    struct gn_render_report *report);
+
+/* primary.c */
+
+/** Fills table[h][w][3] and slopes; see struct frame. */
+void gn_primary_make_rays(const struct gn_camera *camera, struct gn_pool *pool, float *table,
+                          double out_slopes[static 4]);
+/** The unit world direction of a camera direction. */
+void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
+                    struct sample *sample);
+/** Finds what each sample sees. */
+void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
+                      struct tile_figures *figures);
+
+/* shade.c */
+
+/** Follows mirrors from virtual samples to a diffuse surface or the environment. */
+void gn_shade_follow_mirrors(const struct frame *frame, struct sample *samples, int n,
+                             struct tile_figures *figures);
+/** The unit direction after a mirror; in place. */
+void gn_shade_reflect(const struct gn_surface *surface, float dir[static 3]);
+/** Lights the virtual samples of scratch by the frame's lights or the SH irradiance. */
+void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
+                      struct tile_figures *figures);
+
+/* shadow.c */
+
+/** base, lost and gain of the real samples and of those that see nothing. */
+void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n,
+                       struct tile_figures *figures);
+/** Which pixels of the batch have a sample that is cut (with bounces: all): their sums are needed.
+ */
+void gn_shadow_find_groups(const struct frame *frame, const struct sample *samples, int n,
+                           bool *out_groups);
+/** base and lost from open and cut. */
+void gn_shadow_weigh(const struct frame *frame, struct sample *sample);
+/** base of a sample that sees nothing: the map's radiance (a real mirror is taken for that too). */
+void gn_shadow_see_nothing(const struct frame *frame, struct sample *sample);
+/** Zeroes the sums. */
+void gn_shadow_clear(struct sample *sample);
+
+/* reference.c */
+
+/** Fills list from the whole map: every texel, bright ones in parts, and what it does not show. */
+GN_MUST_USE int gn_reference_make_lights(const struct gn_radiance_map *map,
+                                         struct light_list *list);
+/** As gn_shade_samples and gn_shadow_samples, by every direction of the map, with bounces. */
+void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                        struct tile_figures *figures);
+void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                         struct tile_figures *figures);
+
+/* bounce.c */
+
+/** Mean of n_paths random walks through `set` from the diffuse surface of start: indirect radiance
+ * that real surfaces alone carry, and that which virtual ones had a part in. */
+void gn_bounce_gather(const struct frame *frame, const struct sample *start, enum gn_rt_set set,
+                      int n_paths, double out_common[static 3], double out_touched[static 3],
+                      uint64_t *rays);
+
+/* refine.c */
+
+extern const struct refine_rule gn_refine_rules[3]; // by enum gn_quality
+
+/** True where the pixel needs its quality's grid. */
+bool gn_refine_is_needed(const struct frame *frame, int x, int y);
+
+/* layers.c */
+
+/** Makes pixel (x, y) of its samples. */
+void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sample *samples,
+                       int n);
+
+/* light_list.c */
+
+GN_MUST_USE int gn_light_list_reserve(struct light_list *list, int capacity);
+void gn_light_list_finish(struct light_list *list);
+void gn_light_list_add(struct light_list *list, const double dir[static 3],
+                       const double irradiance[static 3]);
+/** Fills list from the state's lights; dark ones are left out. */
+GN_MUST_USE int gn_light_list_from_state(const struct gn_lighting_state *state,
+                                         struct light_list *list);
+
+/* packet.c: rays into packets of 16 */
+
+/** Adds a ray; true where the packet is now full and must be flushed by the caller. */
+bool gn_packet_add(struct scratch *scratch, const float org[static 3], const float dir[static 3],
+                   int sample, int light, float weight);
+/** Traces what the packet holds and empties it; bit i: lane i is hidden. *out_n: lanes. */
+uint32_t gn_packet_trace(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
+                         int *out_n, uint64_t *rays);
+
+/** True unless the ray surely misses the box. */
+bool gn_box_may_meet(const struct box *box, const float org[static 3], const float dir[static 3]);
+/** True unless all rays of direction dir from points of `from` surely miss `box`. */
+bool gn_box_may_meet_from_box(const struct box *box, const struct box *from,
+                              const float dir[static 3]);
+
+static inline float dot3(const float a[static 3], const float b[static 3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** Cosine by which light from dir reaches the surface; 0 where either normal looks away. */
+static inline float surface_cosine(const struct gn_surface *surface, const float dir[static 3])
+{
+    float c = dot3(surface->normal_shading, dir);
+    return c > 0 && dot3(surface->normal_geometric, dir) > 0 ? c : 0;
+}
+
+#endif

@@ -1,0 +1,180 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/render/internal.h"
+
+#include <math.h>
+
+/** The plan's lines, in the order of the passes. */
+enum line { PRIMARY, REFINE, SHADE, MIRROR, SHADOW, BLOCKERS, ADDED, N_LINES };
+
+static const char *const pass_names[N_LINES] = {
+    [PRIMARY] = "primary", [REFINE] = "refine",     [SHADE] = "shade", [MIRROR] = "mirror",
+    [SHADOW] = "shadow",   [BLOCKERS] = "blockers", [ADDED] = "added",
+};
+
+/** why_not NULL: the pass runs, because of why. */
+static void set_line(struct gn_render_report *report, enum line line, const char *why_not,
+                     const char *why)
+{
+    report->plan[line] = (struct gn_plan_entry){
+        .pass = pass_names[line], .ran = !why_not, .why = why_not ? why_not : why};
+}
+
+/** May a ray of the picture meet the box? False only where one plane of the pyramid of all rays, or
+ * the camera's own plane, has the whole box outside. */
+static bool is_box_in_view(const struct frame *frame, const struct box *box,
+                           const double slopes[static 4])
+{
+    int n_outside[5] = {0};
+    for (int corner = 0; corner < 8; corner++) {
+        double world[3];
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            world[k] = (double)(corner >> k & 1 ? box->max[k] : box->min[k]) - frame->origin[k];
+        for (int k = 0; k < 3; k++) // the transpose: camera_from_world
+            p[k] = frame->world_from_camera[k] * world[0] +
+                   frame->world_from_camera[3 + k] * world[1] +
+                   frame->world_from_camera[6 + k] * world[2];
+        n_outside[0] += p[2] <= 0;
+        n_outside[1] += p[0] < slopes[0] * p[2];
+        n_outside[2] += p[0] > slopes[1] * p[2];
+        n_outside[3] += p[1] < slopes[2] * p[2];
+        n_outside[4] += p[1] > slopes[3] * p[2];
+    }
+    for (int i = 0; i < 5; i++) {
+        if (n_outside[i] == 8)
+            return false;
+    }
+    return true;
+}
+
+/** Can any light's ray from real geometry meet the virtual objects? */
+static bool can_any_light_cast(const struct frame *frame)
+{
+    const struct light_list *lights = frame->lights;
+    for (int l = 0; l < lights->n; l++) {
+        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
+        if (gn_box_may_meet_from_box(&frame->virtual_box, &frame->real_box, dir))
+            return true;
+    }
+    return false;
+}
+
+static bool is_real_flat(const struct frame *frame)
+{
+    for (int k = 0; k < 3; k++) {
+        if (frame->real_box.min[k] == frame->real_box.max[k])
+            return true;
+    }
+    return false;
+}
+
+static bool has_virtual_mirror(const struct frame *frame)
+{
+    for (int i = 0; i < frame->scene->n_objects; i++) {
+        const struct gn_scene_object *object = &frame->scene->objects[i];
+        if (object->role == GN_RT_VIRTUAL && object->has_material &&
+            object->material.type == GN_MATERIAL_MIRROR)
+            return true;
+    }
+    return false;
+}
+
+static const char *why_not_virtual(const struct frame *frame, const double slopes[static 4])
+{
+    if (!frame->has_virtual)
+        return "the scene has no virtual object";
+    if (!is_box_in_view(frame, &frame->virtual_box, slopes))
+        return "no virtual object in view";
+    return NULL;
+}
+
+static const char *why_not_light_loop(const struct frame *frame)
+{
+    const struct gn_render_options *options = &frame->options;
+    if (options->shading == GN_SHADING_IRRADIANCE_MAP && options->quality != GN_QUALITY_REFERENCE)
+        return "irradiance shading needs no loop over lights";
+    if (frame->lights->n == 0)
+        return "no light";
+    return NULL;
+}
+
+static const char *why_not_shadow(const struct frame *frame)
+{
+    if (!frame->has_virtual)
+        return "the scene has no virtual object";
+    if (!frame->has_real)
+        return "the scene has no real object to receive one";
+    if (frame->lights->n == 0)
+        return "no light";
+    if (!frame->run_bounces && !can_any_light_cast(frame))
+        return "no light throws a shadow of a virtual object onto a real one";
+    return NULL;
+}
+
+static const char *why_not_blockers(const struct frame *frame)
+{
+    if (frame->options.shadow_ignore_real)
+        return "not asked for: real objects hide no light";
+    if (!frame->options.all_passes && is_real_flat(frame))
+        return "the real geometry is one plane: it hides no light from itself";
+    return NULL;
+}
+
+void gn_plan_make(struct frame *frame, const double slopes[static 4],
+                  struct gn_render_report *report)
+{
+    const struct gn_render_options *options = &frame->options;
+    bool all = options->all_passes;
+    frame->cull = !all;
+    frame->run_bounces = options->bounces > 0;
+    report->n_plan = N_LINES;
+    set_line(report, PRIMARY, NULL, "one ray through each pixel's centre");
+    set_line(report, REFINE,
+             frame->rule.grid > 1 ? NULL : "this quality has one ray for each pixel",
+             "edges get a grid of rays");
+
+    const char *no_virtual = all ? NULL : why_not_virtual(frame, slopes);
+    const char *no_loop = why_not_light_loop(frame);
+    set_line(report, SHADE, no_virtual ? no_virtual : no_loop, "virtual objects may be in view");
+    const char *no_mirror =
+        has_virtual_mirror(frame) ? no_virtual : "no mirror among the virtual objects";
+    set_line(report, MIRROR, no_mirror, "a mirror among the virtual objects");
+
+    const char *no_shadow = options->no_shadow ? "not asked for"
+                            : all              ? NULL
+                                               : why_not_shadow(frame);
+    const char *no_blockers = why_not_blockers(frame);
+    frame->run_shadow = !no_shadow;
+    frame->run_blockers = !no_blockers;
+    set_line(report, SHADOW, no_shadow, "virtual objects may hide light from real ones");
+    set_line(report, BLOCKERS, no_shadow ? no_shadow : no_blockers,
+             "real objects may hide light from real ones");
+    set_line(report, ADDED,
+             !frame->run_bounces ? "0 bounces: nothing is added; caustics of mirrors are not built"
+                                 : no_shadow,
+             "light that virtual objects send to real ones");
+}
+
+/** The pass was ready to run and found no work. */
+static void withdraw(struct gn_render_report *report, enum line line, bool is_idle, const char *why)
+{
+    if (is_idle && report->plan[line].ran)
+        set_line(report, line, why, NULL);
+}
+
+void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
+                    struct gn_render_report *report)
+{
+    if (frame->options.all_passes)
+        return;
+    withdraw(report, REFINE, sum->n_refined_pixels == 0, "no edge in view");
+    withdraw(report, SHADE, sum->n_lit == 0, "no pixel shows a diffuse virtual surface");
+    withdraw(report, MIRROR, sum->n_mirrors == 0, "no pixel shows a virtual mirror");
+    withdraw(report, BLOCKERS, sum->n_receivers == 0, "no diffuse real surface in view");
+    withdraw(report, SHADOW, sum->n_receivers == 0, "no diffuse real surface in view");
+    withdraw(report, BLOCKERS, sum->n_rays_real == 0, "no pixel loses light to a virtual object");
+    withdraw(report, SHADOW, sum->rays_shadow == 0,
+             "no light's ray from a pixel comes near a virtual object");
+    withdraw(report, ADDED, sum->n_receivers == 0, "no diffuse real surface in view");
+}

@@ -1,0 +1,113 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/render/internal.h"
+
+#include <math.h>
+
+struct rays_job {
+    const struct gn_camera *camera;
+    float *table;
+};
+
+static void make_row(void *context, int y, int worker)
+{
+    (void)worker;
+    const struct rays_job *job = context;
+    const struct gn_camera *camera = job->camera;
+    float *row = job->table + (size_t)y * (size_t)camera->width * 3;
+    for (int x = 0; x < camera->width; x++) {
+        double dir[3];
+        if (!gn_camera_get_ray(camera, x + 0.5, y + 0.5, dir))
+            dir[0] = dir[1] = dir[2] = 0;
+        for (int k = 0; k < 3; k++)
+            row[3 * x + k] = (float)dir[k];
+    }
+}
+
+/** Slopes of a ray; false where the camera has none. */
+static bool get_slopes(const float *dir, double out[static 2])
+{
+    if (!(dir[2] > 0))
+        return false;
+    out[0] = (double)dir[0] / dir[2];
+    out[1] = (double)dir[1] / dir[2];
+    return true;
+}
+
+/** Bounds of all slopes, and of the rays of grids: they lie between neighbours or half a pixel
+ * outside, so twice the widest step between neighbours is kept as a margin. */
+static void bound_slopes(const struct gn_camera *camera, const float *table, double s[static 4])
+{
+    size_t width = (size_t)camera->width;
+    size_t n = width * (size_t)camera->height;
+    double step[2] = {1 / camera->fx, 1 / camera->fy};
+    s[0] = s[2] = INFINITY;
+    s[1] = s[3] = -INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        double here[2];
+        double there[2];
+        if (!get_slopes(table + 3 * i, here))
+            continue;
+        for (int k = 0; k < 2; k++) {
+            s[2 * k] = fmin(s[2 * k], here[k]);
+            s[2 * k + 1] = fmax(s[2 * k + 1], here[k]);
+        }
+        for (int k = 0; k < 2; k++) {
+            bool is_last = k == 0 ? i % width == width - 1 : i + width >= n;
+            if (is_last || !get_slopes(table + 3 * (i + (k == 0 ? 1 : width)), there))
+                continue;
+            for (int a = 0; a < 2; a++)
+                step[a] = fmax(step[a], fabs(there[a] - here[a]));
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        s[2 * k] -= 2 * step[k];
+        s[2 * k + 1] += 2 * step[k];
+    }
+}
+
+void gn_primary_make_rays(const struct gn_camera *camera, struct gn_pool *pool, float *table,
+                          double out_slopes[static 4])
+{
+    struct rays_job job = {.camera = camera, .table = table};
+    gn_pool_run(pool, camera->height, make_row, &job);
+    bound_slopes(camera, table, out_slopes);
+}
+
+void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
+                    struct sample *sample)
+{
+    const double *r = frame->world_from_camera;
+    for (int k = 0; k < 3; k++)
+        sample->dir[k] = (float)(r[3 * k] * dir_camera[0] + r[3 * k + 1] * dir_camera[1] +
+                                 r[3 * k + 2] * dir_camera[2]);
+    sample->dir_z = dir_camera[2];
+}
+
+void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
+                      struct tile_figures *figures)
+{
+    for (int i = 0; i < n; i++) {
+        struct sample *s = &samples[i];
+        struct gn_rt_hit hit;
+        s->kind = SAMPLE_NOTHING;
+        s->depth = INFINITY;
+        s->is_receiver = s->is_cut = s->is_lit = false;
+        if (!(s->dir_z > 0))
+            continue;
+        figures->rays_primary++;
+        // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
+        if (!gn_rt_intersect(frame->rt, GN_RT_ALL, frame->origin, s->dir, 0, INFINITY, &hit))
+            continue;
+        gn_scene_get_surface(frame->scene, s->dir, &hit, &s->surface);
+        const struct gn_surface *surface = &s->surface;
+        s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
+        s->object = hit.object;
+        s->depth = hit.distance * s->dir_z;
+        gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
+                            surface->normal_geometric, s->org);
+        // A shadow is less light on a diffuse surface; a real mirror shows other things.
+        s->is_receiver = s->kind == SAMPLE_REAL && surface->material == GN_MATERIAL_DIFFUSE;
+        figures->n_receivers += s->is_receiver;
+    }
+}

@@ -1,0 +1,139 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/render/internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "server/light/sh.h"
+
+void gn_shade_reflect(const struct gn_surface *surface, float dir[static 3])
+{
+    const float *n = surface->normal_shading;
+    float c = 2 * dot3(dir, n);
+    float out[3] = {dir[0] - c * n[0], dir[1] - c * n[1], dir[2] - c * n[2]};
+    if (!(dot3(out, surface->normal_geometric) > 0)) { // an interpolated normal may point inside
+        n = surface->normal_geometric;
+        c = 2 * dot3(dir, n);
+        for (int k = 0; k < 3; k++)
+            out[k] = dir[k] - c * n[k];
+    }
+    float scale = 1 / sqrtf(dot3(out, out));
+    for (int k = 0; k < 3; k++)
+        dir[k] = out[k] * scale;
+}
+
+/** Mirrors of one sample: radiance where the environment is seen, else a lit surface. */
+static void follow_mirrors(const struct frame *frame, struct sample *s,
+                           struct tile_figures *figures)
+{
+    float dir[3] = {s->dir[0], s->dir[1], s->dir[2]};
+    figures->n_mirrors++;
+    for (int depth = 1; s->surface.material == GN_MATERIAL_MIRROR; depth++) {
+        struct gn_rt_hit hit;
+        for (int k = 0; k < 3; k++)
+            s->through[k] *= s->surface.albedo[k];
+        gn_shade_reflect(&s->surface, dir);
+        bool met = false;
+        if (depth <= MIRROR_DEPTH) {
+            figures->rays_mirror++;
+            met = gn_rt_intersect(frame->rt, GN_RT_ALL, s->org, dir, 0, INFINITY, &hit);
+        }
+        if (!met) {
+            float radiance[3];
+            gn_radiance_map_get_radiance(frame->state->map, dir, radiance);
+            for (int k = 0; k < 3; k++)
+                s->radiance[k] = (double)s->through[k] * radiance[k];
+            s->is_lit = false;
+            return;
+        }
+        gn_scene_get_surface(frame->scene, dir, &hit, &s->surface);
+        gn_rt_offset_origin(s->surface.point, s->surface.normal_geometric, s->surface.clearance,
+                            s->surface.normal_geometric, s->org);
+    }
+}
+
+void gn_shade_follow_mirrors(const struct frame *frame, struct sample *samples, int n,
+                             struct tile_figures *figures)
+{
+    for (int i = 0; i < n; i++) {
+        struct sample *s = &samples[i];
+        if (s->kind != SAMPLE_VIRTUAL)
+            continue;
+        s->is_lit = true;
+        for (int k = 0; k < 3; k++) {
+            s->through[k] = 1;
+            s->radiance[k] = s->indirect[k] = 0;
+        }
+        if (s->surface.material == GN_MATERIAL_MIRROR)
+            follow_mirrors(frame, s, figures);
+        figures->n_lit += s->is_lit;
+    }
+}
+
+/** Diffuse radiance of irradiance E: albedo / pi E. */
+static void reflect_irradiance(struct sample *s, const double irradiance[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        s->radiance[k] += (double)s->through[k] * s->surface.albedo[k] / M_PI * irradiance[k];
+}
+
+static void shade_by_irradiance_map(const struct frame *frame, struct sample *s)
+{
+    const double normal[3] = {s->surface.normal_shading[0], s->surface.normal_shading[1],
+                              s->surface.normal_shading[2]};
+    double e[3];
+    gn_sh_get_irradiance(frame->state->sh, normal, e);
+    for (int k = 0; k < 3; k++)
+        e[k] = fmax(e[k], 0);
+    reflect_irradiance(s, e);
+}
+
+/** Adds the light of the packet's free lanes to their samples' irradiance. */
+static void flush(const struct frame *frame, struct scratch *scratch, double (*irradiance)[3],
+                  struct tile_figures *figures)
+{
+    int n;
+    uint32_t hidden = gn_packet_trace(frame, scratch, GN_RT_ALL, &n, &figures->rays_shade);
+    for (int lane = 0; lane < n; lane++) {
+        if (hidden >> lane & 1)
+            continue;
+        double *e = irradiance[scratch->lane_sample[lane]];
+        int light = scratch->lane_light[lane];
+        for (int k = 0; k < 3; k++)
+            e[k] += (double)scratch->lane_weight[lane] * frame->lights->irradiance[k][light];
+    }
+}
+
+void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
+                      struct tile_figures *figures)
+{
+    int m = 0;
+    for (int i = 0; i < n; i++) {
+        struct sample *s = &scratch->samples[i];
+        if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
+            continue;
+        if (frame->options.shading == GN_SHADING_IRRADIANCE_MAP)
+            shade_by_irradiance_map(frame, s);
+        else
+            scratch->lit[m++] = i;
+    }
+    if (m == 0)
+        return;
+    // Lights outside, samples inside: the 16 rays of a packet are nearly parallel and close.
+    double irradiance[BATCH][3];
+    memset(irradiance, 0, (size_t)m * sizeof(irradiance[0]));
+    const struct light_list *lights = frame->lights;
+    for (int l = 0; l < lights->n; l++) {
+        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
+        for (int j = 0; j < m; j++) {
+            const struct sample *s = &scratch->samples[scratch->lit[j]];
+            float c = surface_cosine(&s->surface, dir);
+            if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c))
+                flush(frame, scratch, irradiance, figures);
+        }
+    }
+    flush(frame, scratch, irradiance, figures);
+    for (int j = 0; j < m; j++)
+        reflect_irradiance(&scratch->samples[scratch->lit[j]], irradiance[j]);
+}
