@@ -22,7 +22,8 @@
 struct gn_environment_frame {
     const struct gn_image *codes; // 1, 3 or 4 channels (the 4th ignored): codes in [0, 1], or
                                   // linear values (float frames)
-    bool has_rail; // codes come from an integer sensor format: 1 is its upper rail
+    int code_max; // 255, 4095, ... of an integer sensor format, whose code 1 is the upper rail;
+                  // 0: float frame
     struct gn_projection projection;
     struct gn_response response;
     double world_from_probe[4]; // quaternion w, x, y, z
@@ -38,7 +39,7 @@ struct gn_environment_frame {
 struct gn_radiance_map_figures {
     int n_nan, n_inf, n_negative; // texels with such a channel: set to 0, the neighbours' median, 0
     int n_capped;                 // texels with a channel above GN_RADIANCE_MAX: set to it
-    int n_clipped;                // texels at the sensor's upper rail (has_rail frames)
+    int n_clipped;                // texels at the sensor's upper rail (code_max > 0)
     double mean_luminance;        // solid-angle weighted over the shown part, W/(sr m^2)
     double max_luminance;
     double shown_solid_angle;   // sr

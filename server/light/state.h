@@ -57,12 +57,12 @@ enum gn_partition_reading {
 /** Options; all-zero is the default of the method. */
 struct gn_light_options {
     enum gn_light_method method;
-    int n_lights;  // wanted number where the method can aim (energy with log2, Penrose),
-                   // [1, GN_LIGHTS_MAX] or GN_LIGHTS_NO_AIM; default 64
-    int rings;     // base division of a hemisphere, [1, 64]; default 8 (seed), 4 (energy; follows
-                   // n_lights)
-    int sectors;   // [1, 256], rings * sectors <= 1024; default 24 (seed), 12 (energy; as above)
-    int max_ls;    // the paper's maxLS, [1, 4096]; default 8, at least n_lights / 8 (energy)
+    int n_lights; // wanted number where the method can aim (energy with log2, Penrose),
+                  // [1, GN_LIGHTS_MAX] or GN_LIGHTS_NO_AIM; default 64
+    int rings; // base division of a hemisphere, [1, 64]; default 8 (seed), else by n_lights: 4 for
+               // 64 lights of a fisheye
+    int sectors;   // [1, 256], rings * sectors <= 1024; default 3 rings
+    int max_ls;    // the paper's maxLS, [1, 4096]; default 8; n_lights / 8 where more
     int n_samples; // Penrose samples under the partition, [1, 2^20]; default 16 per base region
     enum gn_partition_metric metric; // default log2 (energy) or 2^k (seed)
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)

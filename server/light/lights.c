@@ -1,0 +1,167 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/light/lights.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "server/light/luminance.h"
+
+static const double pi = 3.14159265358979323846;
+
+void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel)
+{
+    const float *l = map->radiance.data + 3 * (size_t)texel;
+    const float *d = map->direction_world + 3 * (size_t)texel;
+    double w = (double)map->solid_angle[texel], energy = gn_luminance(l) * w;
+    for (int c = 0; c < 3; c++) {
+        patch->irradiance[c] += (double)l[c] * w;
+        patch->toward[c] += energy * (double)d[c];
+    }
+    patch->energy += energy;
+    patch->own_spread += energy * w / (4 * pi);
+    patch->solid_angle += w;
+    patch->n_lit += energy > 0;
+}
+
+void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)
+{
+    for (int c = 0; c < 3; c++) {
+        patch->irradiance[c] += other->irradiance[c];
+        patch->toward[c] += other->toward[c];
+    }
+    patch->energy += other->energy;
+    patch->own_spread += other->own_spread;
+    patch->solid_angle += other->solid_angle;
+    patch->n_lit += other->n_lit;
+}
+
+bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light)
+{
+    if (!(patch->energy > 0))
+        return false;
+    double v[3], length = 0;
+    for (int c = 0; c < 3; c++) {
+        v[c] = patch->toward[c] / patch->energy;
+        length += v[c] * v[c];
+    }
+    length = sqrt(length);
+    double spread = fmax(1 - length, 0) + patch->own_spread / patch->energy;
+    *out_light = (struct gn_light){.dir_world = {0, 0, 1},
+                                   .angular_radius = (float)acos(fmax(1 - 2 * spread, -1))};
+    for (int c = 0; c < 3; c++) {
+        if (length > 1e-9) // else light from all sides: any direction is as good
+            out_light->dir_world[c] = (float)(v[c] / length);
+        out_light->irradiance[c] = (float)patch->irradiance[c];
+    }
+    return true;
+}
+
+int gn_light_list_add(struct gn_light_list *list, const struct gn_light *light)
+{
+    if (list->n == list->capacity) {
+        int capacity = list->capacity ? 2 * list->capacity : 128;
+        struct gn_light *lights = realloc(list->lights, (size_t)capacity * sizeof(*lights));
+        if (!lights)
+            return -ENOMEM;
+        list->lights = lights;
+        list->capacity = capacity;
+    }
+    list->lights[list->n++] = *light;
+    return 0;
+}
+
+int gn_light_list_add_fill(struct gn_light_list *list, const struct gn_radiance_map *map,
+                           const struct gn_partition_plan *plan, int *out_n)
+{
+    double luminance = gn_luminance(map->fill);
+    *out_n = 0;
+    for (int i = 0; i < plan->n_fill_cells; i++) {
+        const struct gn_fill_cell *cell = &plan->fill_cell[i];
+        struct gn_patch patch = {.energy = luminance * cell->solid_angle};
+        for (int c = 0; c < 3; c++) {
+            patch.irradiance[c] = (double)map->fill[c] * cell->solid_angle;
+            patch.toward[c] = luminance * cell->toward[c];
+        }
+        struct gn_light light;
+        if (!gn_patch_get_light(&patch, &light))
+            continue;
+        int rc = gn_light_list_add(list, &light);
+        if (rc < 0)
+            return rc;
+        ++*out_n;
+    }
+    return 0;
+}
+
+void gn_light_list_finish(struct gn_light_list *list)
+{
+    free(list->lights);
+    *list = (struct gn_light_list){0};
+}
+
+static bool is_in(int value, int low, int high)
+{
+    return value == 0 || (value >= low && value <= high);
+}
+
+static const char *check_options(const struct gn_light_options *o)
+{
+    if ((unsigned)o->method >= GN_LIGHT_METHOD_COUNT)
+        return "the method is unknown";
+    if ((unsigned)o->metric > GN_METRIC_LOG2)
+        return "the metric is unknown";
+    if (o->n_lights != GN_LIGHTS_NO_AIM && !is_in(o->n_lights, 1, GN_LIGHTS_MAX))
+        return "the number of lights must lie in [1, 4096]";
+    if (!is_in(o->rings, 1, 64) || !is_in(o->sectors, 1, 256))
+        return "the base division must have [1, 64] rings and [1, 256] sectors";
+    if (!is_in(o->max_ls, 1, 4096))
+        return "maxLS must lie in [1, 4096]";
+    if (!is_in(o->n_samples, 1, 1 << 20))
+        return "the number of samples must lie in [1, 1048576]";
+    if ((o->literal | o->mended) & ~(unsigned)GN_READ_ALL)
+        return "a reading is unknown";
+    return NULL;
+}
+
+/* So many rings that about half of the wanted lights, but no fewer than three, are whole regions
+ * of the part shown: then it is the light that says where the others go. */
+static int choose_rings(const struct gn_radiance_map *map, int n_lights)
+{
+    double hemispheres = fmax(map->figures.shown_solid_angle / (2 * pi), 1);
+    return (int)fmin(fmax(lround(sqrt(n_lights / hemispheres / 4)), 1), 18);
+}
+
+int gn_light_settings_init(struct gn_light_settings *settings,
+                           const struct gn_light_options *options,
+                           const struct gn_radiance_map *map, struct gn_error *out_error)
+{
+    const struct gn_light_options *o = options;
+    const char *reason = check_options(o);
+    bool is_seed = o->method == GN_LIGHT_PARTITION_SEED;
+    bool has_aim = o->n_lights != GN_LIGHTS_NO_AIM && !is_seed;
+    struct gn_light_settings s = {.method = o->method, .metric = o->metric};
+    s.literal = ((is_seed ? GN_READ_ALL : 0) | o->literal) & ~o->mended;
+    if (s.metric == GN_METRIC_DEFAULT)
+        s.metric = is_seed ? GN_METRIC_POW2 : GN_METRIC_LOG2;
+    s.n_aim = o->n_lights > 0 ? o->n_lights : 64;
+
+    int rings = is_seed ? 8 : choose_rings(map, s.n_aim);
+    s.division.rings = o->rings > 0 ? o->rings : rings;
+    s.division.sectors = o->sectors > 0 ? o->sectors : 3 * s.division.rings;
+    s.division.dark_rings = (s.division.rings + 1) / 2;
+    s.division.dark_sectors = (s.division.sectors + 1) / 2;
+    s.division.is_equal_angle = (s.literal & GN_READ_RADIUS_RINGS) != 0;
+    if (!reason && s.division.rings * s.division.sectors > 1024)
+        reason = "the base division must not have more than 1024 regions (rings times sectors)";
+    if (reason)
+        return gn_error_set(out_error, -EINVAL, "light options: %s", reason);
+
+    s.max_ls = o->max_ls > 0 ? o->max_ls : has_aim && s.n_aim > 64 ? (s.n_aim + 7) / 8 : 8;
+    s.n_samples = o->n_samples > 0 ? o->n_samples : 16 * s.division.rings * s.division.sectors;
+    if (!has_aim || (s.method == GN_LIGHT_PARTITION_ENERGY && s.metric != GN_METRIC_LOG2))
+        s.n_aim = o->method == GN_LIGHT_PENROSE ? 64 : 0;
+    *settings = s;
+    return 0;
+}

@@ -1,0 +1,78 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What the methods that make lights of a map share: the sums over a patch of the sphere, the light
+ * that stands for it, and the list they fill.
+ */
+#ifndef GN_SERVER_LIGHT_LIGHTS_H
+#define GN_SERVER_LIGHT_LIGHTS_H
+
+#include "proto/attr.h"
+#include "server/light/partition_plan.h"
+#include "server/light/state.h"
+
+/** Sums over texels, in double. A value; zeroed: empty. */
+struct gn_patch {
+    double irradiance[3]; // of L dOmega
+    double energy;        // of Y dOmega
+    double toward[3];     // of Y dOmega d
+    double own_spread;    // of Y dOmega (dOmega / 4 pi): 1 - |mean direction| within the texels
+    double solid_angle;   // of dOmega
+    int n_lit;            // texels with light
+};
+
+/** Adds one texel of the map. */
+void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel);
+/** Adds another patch. */
+void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other);
+/**
+ * The light of a patch: its irradiance from its energy's centroid, as wide as the disc of even
+ * radiance whose mean direction is as long, 1 - |mean| = (1 - cos angular_radius) / 2. False for a
+ * black patch.
+ */
+bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light);
+
+/** A list that grows. Thread-safety: unsafe. */
+struct gn_light_list {
+    int n, capacity;
+    struct gn_light *lights; // owned
+};
+/** Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_light_list_add(struct gn_light_list *list, const struct gn_light *light);
+/** One light for each cell that the map does not show, of the map's fill. */
+GN_MUST_USE int gn_light_list_add_fill(struct gn_light_list *list,
+                                       const struct gn_radiance_map *map,
+                                       const struct gn_partition_plan *plan, int *out_n);
+void gn_light_list_finish(struct gn_light_list *list);
+
+/** The options with each default of their method filled in, and what follows from them. */
+struct gn_light_settings {
+    enum gn_light_method method;
+    unsigned literal; // the readings in effect
+    enum gn_partition_metric metric;
+    struct gn_division division;
+    int max_ls;
+    int n_samples;
+    int n_aim; // 0: none
+};
+
+/** Returns 0, or -EINVAL and a sentence. */
+GN_MUST_USE int gn_light_settings_init(struct gn_light_settings *settings,
+                                       const struct gn_light_options *options,
+                                       const struct gn_radiance_map *map,
+                                       struct gn_error *out_error);
+
+/** The paper's partition, in any reading (partition.c). */
+GN_MUST_USE int gn_partition_make_lights(const struct gn_radiance_map *map,
+                                         const struct gn_light_settings *settings,
+                                         const struct gn_partition_plan *plan, struct gn_pool *pool,
+                                         struct gn_light_list *list,
+                                         struct gn_light_figures *figures);
+/** The importance samples themselves, of equal power (penrose_lights.c). */
+GN_MUST_USE int gn_penrose_make_lights(const struct gn_radiance_map *map,
+                                       const struct gn_light_settings *settings,
+                                       const struct gn_partition_plan *plan,
+                                       struct gn_light_list *list,
+                                       struct gn_light_figures *figures);
+
+#endif

@@ -1,0 +1,243 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/light/map_table.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double pi = 3.14159265358979323846;
+
+static bool is_same_projection(const struct gn_projection *a, const struct gn_projection *b)
+{
+    bool is_same = a->type == b->type && a->width == b->width && a->height == b->height &&
+                   a->center[0] == b->center[0] && a->center[1] == b->center[1] &&
+                   a->radius == b->radius && a->theta_max == b->theta_max;
+    for (int i = 0; i < 4; i++)
+        is_same = is_same && a->k[i] == b->k[i];
+    return is_same;
+}
+
+/* The position of the texel's centre, drawn into the circle where it lies outside. */
+static bool clamp_to_circle(const struct gn_projection *p, double margin, double xy[static 2])
+{
+    if (p->type == GN_PROJECTION_LATLONG)
+        return false;
+    double dx = xy[0] - p->center[0], dy = xy[1] - p->center[1], r = hypot(dx, dy);
+    if (r <= p->radius)
+        return false;
+    double scale = fmax(p->radius - margin, 0) / r;
+    xy[0] = fmin(fmax(p->center[0] + scale * dx, 0), p->width);
+    xy[1] = fmin(fmax(p->center[1] + scale * dy, 0), p->height);
+    return true;
+}
+
+static void address_row(void *context, int y, int worker)
+{
+    (void)worker;
+    struct gn_map_table *t = context;
+    const struct gn_projection *p = &t->projection;
+    for (int x = 0; x < p->width; x++) {
+        size_t i = (size_t)y * (size_t)p->width + (size_t)x;
+        double solid_angle = gn_projection_get_solid_angle(p, x, y);
+        double xy[2] = {x + 0.5, y + 0.5}, dir[3] = {0, 0, 1};
+        bool has_light = solid_angle > 0;
+        if (has_light)
+            clamp_to_circle(p, 0.25, xy);
+        if (!gn_projection_get_direction(p, xy[0], xy[1], dir))
+            has_light = false;
+        t->solid_angle[i] = has_light ? (float)solid_angle : 0;
+        for (int c = 0; c < 3; c++)
+            t->direction_probe[3 * i + (size_t)c] = (float)dir[c];
+    }
+}
+
+static void rotate_row(void *context, int y, int worker)
+{
+    (void)worker;
+    struct gn_map_table *t = context;
+    const double *m = t->world_from_probe;
+    size_t width = (size_t)t->projection.width, start = (size_t)y * width;
+    for (size_t i = start; i < start + width; i++) {
+        const float *d = t->direction_probe + 3 * i;
+        for (int c = 0; c < 3; c++)
+            t->direction_world[3 * i + (size_t)c] =
+                (float)(m[3 * c] * (double)d[0] + m[3 * c + 1] * (double)d[1] +
+                        m[3 * c + 2] * (double)d[2]);
+    }
+}
+
+/* Pairs the texels whose centres lie outside the circle with inner ones, one texel further in. */
+static int list_rim(struct gn_map_table *t)
+{
+    const struct gn_projection *p = &t->projection;
+    if (p->type == GN_PROJECTION_LATLONG)
+        return 0;
+    for (int pass = 0; pass < 2; pass++) {
+        int n = 0;
+        for (int y = 0; y < p->height; y++) {
+            for (int x = 0; x < p->width; x++) {
+                size_t i = (size_t)y * (size_t)p->width + (size_t)x;
+                double xy[2] = {x + 0.5, y + 0.5};
+                if (!(t->solid_angle[i] > 0) || !clamp_to_circle(p, 0.75, xy))
+                    continue;
+                if (pass == 1) {
+                    int ix = (int)fmin(xy[0], p->width - 1), iy = (int)fmin(xy[1], p->height - 1);
+                    t->rim[2 * n] = (uint32_t)i;
+                    t->rim[2 * n + 1] = (uint32_t)iy * (uint32_t)p->width + (uint32_t)ix;
+                }
+                n++;
+            }
+        }
+        t->n_rim = n;
+        if (pass == 0 && n > 0 && !(t->rim = calloc((size_t)n, 2 * sizeof(*t->rim))))
+            return -ENOMEM;
+    }
+    return 0;
+}
+
+/* Integrals of the harmonics over the complement of the cap theta <= theta_max about the axis. */
+static void integrate_complement(struct gn_map_table *t)
+{
+    const double *n = t->axis_world;
+    double c = cos(t->projection.theta_max), s2 = 1 - c * c;
+    double q = -pi * c * s2; // integral of d d^T - I/3 is q (n n^T - I/3)
+    double *h = t->fill_harmonics;
+    h[0] = 2 * pi * (1 + c);
+    h[1] = -pi * s2 * n[1];
+    h[2] = -pi * s2 * n[2];
+    h[3] = -pi * s2 * n[0];
+    h[4] = q * n[0] * n[1];
+    h[5] = q * n[1] * n[2];
+    h[6] = q * (3 * n[2] * n[2] - 1);
+    h[7] = q * n[0] * n[2];
+    h[8] = q * (n[0] * n[0] - n[1] * n[1]);
+}
+
+/* The same where the picture's border cuts the circle: what the texels leave of the sphere. */
+static void subtract_texels(struct gn_map_table *t)
+{
+    double h[9] = {4 * pi};
+    size_t n = (size_t)t->projection.width * (size_t)t->projection.height;
+    for (size_t i = 0; i < n; i++) {
+        double w = (double)t->solid_angle[i], w1 = w * (1 - w / 12), w2 = w * (1 - w / 4);
+        double x = (double)t->direction_world[3 * i], y = (double)t->direction_world[3 * i + 1],
+               z = (double)t->direction_world[3 * i + 2];
+        double b[9] = {w,
+                       w1 * y,
+                       w1 * z,
+                       w1 * x,
+                       w2 * x * y,
+                       w2 * y * z,
+                       w2 * (3 * z * z - 1),
+                       w2 * z * x,
+                       w2 * (x * x - y * y)};
+        for (int k = 0; k < 9; k++)
+            h[k] -= b[k];
+    }
+    memcpy(t->fill_harmonics, h, sizeof(h));
+    t->fill_harmonics[0] = fmax(h[0], 0);
+}
+
+static void sum_solid_angles(struct gn_map_table *t)
+{
+    const struct gn_projection *p = &t->projection;
+    for (int y = 0; y < p->height; y++) {
+        double row = 0;
+        for (int x = 0; x < p->width; x++)
+            row += (double)t->solid_angle[(size_t)y * (size_t)p->width + (size_t)x];
+        t->shown_solid_angle += row;
+    }
+    double reach = p->radius * (1 - 1e-6);
+    bool is_cut = p->center[0] < reach || p->center[0] + reach > p->width || p->center[1] < reach ||
+                  p->center[1] + reach > p->height;
+    if (p->type == GN_PROJECTION_LATLONG || gn_projection_is_full_sphere(p))
+        return;
+    if (is_cut)
+        subtract_texels(t);
+    else
+        integrate_complement(t);
+    t->fill_solid_angle = t->fill_harmonics[0];
+}
+
+static void fill_matrix(struct gn_map_table *t)
+{
+    struct gn_pose pose = {0};
+    memcpy(pose.rotation, t->rotation, sizeof(pose.rotation));
+    double m[16];
+    gn_pose_to_matrix(&pose, m);
+    for (int i = 0; i < 9; i++)
+        t->world_from_probe[i] = m[4 * (i / 3) + i % 3];
+    for (int i = 0; i < 3; i++)
+        t->axis_world[i] = t->world_from_probe[3 * i + 2];
+}
+
+static int fill_table(struct gn_map_table *t, const struct gn_map_table *previous,
+                      struct gn_pool *pool)
+{
+    size_t n = (size_t)t->projection.width * (size_t)t->projection.height;
+    t->solid_angle = calloc(n, sizeof(*t->solid_angle));
+    t->direction_probe = calloc(n, 3 * sizeof(*t->direction_probe));
+    t->direction_world = calloc(n, 3 * sizeof(*t->direction_world));
+    if (!t->solid_angle || !t->direction_probe || !t->direction_world)
+        return -ENOMEM;
+    if (previous && is_same_projection(&previous->projection, &t->projection)) {
+        memcpy(t->solid_angle, previous->solid_angle, n * sizeof(*t->solid_angle));
+        memcpy(t->direction_probe, previous->direction_probe, 3 * n * sizeof(*t->direction_probe));
+    } else {
+        gn_pool_run(pool, t->projection.height, address_row, t);
+    }
+    fill_matrix(t);
+    gn_pool_run(pool, t->projection.height, rotate_row, t);
+    if (list_rim(t) < 0)
+        return -ENOMEM;
+    sum_solid_angles(t);
+    return 0;
+}
+
+int gn_map_table_create(const struct gn_projection *projection, const double rotation[static 4],
+                        struct gn_map_table *previous, struct gn_pool *pool,
+                        struct gn_map_table **out_table)
+{
+    *out_table = NULL;
+    if (previous && is_same_projection(&previous->projection, projection) &&
+        memcmp(previous->rotation, rotation, sizeof(previous->rotation)) == 0) {
+        *out_table = gn_map_table_ref(previous);
+        return 0;
+    }
+    struct gn_map_table *t = calloc(1, sizeof(*t));
+    if (!t)
+        return -ENOMEM;
+    atomic_init(&t->references, 1);
+    t->projection = *projection;
+    memcpy(t->rotation, rotation, sizeof(t->rotation));
+    int rc = fill_table(t, previous, pool);
+    if (rc < 0) {
+        gn_map_table_unref(&t);
+        return rc;
+    }
+    *out_table = t;
+    return 0;
+}
+
+struct gn_map_table *gn_map_table_ref(struct gn_map_table *table)
+{
+    atomic_fetch_add_explicit(&table->references, 1, memory_order_relaxed);
+    return table;
+}
+
+void gn_map_table_unref(struct gn_map_table **table)
+{
+    struct gn_map_table *t = *table;
+    *table = NULL;
+    if (!t || atomic_fetch_sub_explicit(&t->references, 1, memory_order_acq_rel) != 1)
+        return;
+    free(atomic_load_explicit(&t->spare, memory_order_relaxed));
+    free(t->rim);
+    free(t->direction_world);
+    free(t->direction_probe);
+    free(t->solid_angle);
+    free(t);
+}

@@ -1,0 +1,173 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/light/state.h"
+
+#include <errno.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/clock.h"
+#include "server/light/lights.h"
+#include "server/light/luminance.h"
+#include "server/light/sh.h"
+
+static const char *const names[GN_LIGHT_METHOD_COUNT] = {
+    [GN_LIGHT_PARTITION_ENERGY] = "partition",
+    [GN_LIGHT_PARTITION_SEED] = "seed",
+    [GN_LIGHT_PENROSE] = "penrose",
+};
+
+const char *gn_light_method_get_name(enum gn_light_method method)
+{
+    return (unsigned)method < GN_LIGHT_METHOD_COUNT ? names[method] : NULL;
+}
+
+int gn_light_method_from_name(const char *name, enum gn_light_method *out_method)
+{
+    for (int i = 0; i < GN_LIGHT_METHOD_COUNT; i++) {
+        if (strcmp(name, names[i]) == 0) {
+            *out_method = (enum gn_light_method)i;
+            return 0;
+        }
+    }
+    return -EINVAL;
+}
+
+/* A light with its place in the list, which decides between equals. */
+struct ranked_light {
+    struct gn_light light;
+    double luminance;
+    int place;
+};
+
+static int compare_ranked(const void *a, const void *b)
+{
+    const struct ranked_light *la = a, *lb = b;
+    if (la->luminance != lb->luminance)
+        return la->luminance > lb->luminance ? -1 : 1;
+    return la->place < lb->place ? -1 : la->place > lb->place;
+}
+
+/* Moves the list's lights into the state, by falling luminance, the weakest beyond the bound left
+ * out. */
+static int take_lights(struct gn_lighting_state *state, const struct gn_light_list *list)
+{
+    struct ranked_light *ranked = malloc((size_t)list->n * sizeof(*ranked) + 1);
+    int n = list->n < GN_LIGHTS_MAX ? list->n : GN_LIGHTS_MAX;
+    state->lights = malloc((size_t)n * sizeof(*state->lights) + 1);
+    if (!ranked || !state->lights) {
+        free(ranked);
+        return -ENOMEM;
+    }
+    for (int i = 0; i < list->n; i++)
+        ranked[i] =
+            (struct ranked_light){list->lights[i], gn_luminance(list->lights[i].irradiance), i};
+    qsort(ranked, (size_t)list->n, sizeof(*ranked), compare_ranked);
+    for (int i = 0; i < n; i++)
+        state->lights[i] = ranked[i].light;
+    state->n_lights = n;
+    state->figures.n_dropped = list->n - n;
+    free(ranked);
+    return 0;
+}
+
+static int make_lights(struct gn_lighting_state *state, const struct gn_light_options *options,
+                       struct gn_pool *pool, struct gn_error *out_error)
+{
+    struct gn_light_settings settings;
+    int rc = gn_light_settings_init(&settings, options, state->map, out_error);
+    if (rc < 0)
+        return rc;
+    struct gn_light_list list = {0};
+    rc = gn_partition_plan_create(state->map, &settings.division,
+                                  options->previous ? options->previous->plan : NULL, &state->plan);
+    if (rc == 0 && settings.method == GN_LIGHT_PENROSE)
+        rc = gn_penrose_make_lights(state->map, &settings, state->plan, &list, &state->figures);
+    else if (rc == 0)
+        rc = gn_partition_make_lights(state->map, &settings, state->plan, pool, &list,
+                                      &state->figures);
+    if (rc == 0)
+        rc = take_lights(state, &list);
+    gn_light_list_finish(&list);
+    return rc < 0 ? gn_error_set(out_error, rc, "lights: no memory") : 0;
+}
+
+static double to_ms(int64_t duration_ns)
+{
+    return (double)duration_ns / (double)GN_NS_PER_MS;
+}
+
+static int fill_state(struct gn_lighting_state *state, const struct gn_environment_frame *frame,
+                      const struct gn_radiance_map_options *map_options,
+                      const struct gn_light_options *options, struct gn_pool *pool,
+                      struct gn_error *out_error)
+{
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    int rc = gn_radiance_map_create(frame, map_options, pool, &state->map, out_error);
+    if (rc < 0)
+        return rc;
+    int64_t map_ns = gn_clock_get_monotonic_ns();
+    state->has_sh = !options->no_sh;
+    if (state->has_sh && gn_sh_project_map(state->map, pool, state->sh) < 0)
+        return gn_error_set(out_error, -ENOMEM, "spherical harmonics: no memory");
+    int64_t sh_ns = gn_clock_get_monotonic_ns();
+    rc = make_lights(state, options, pool, out_error);
+    if (rc < 0)
+        return rc;
+    for (int c = 0; c < 3; c++)
+        state->total_irradiance[c] = state->map->figures.shown_irradiance[c] +
+                                     (double)state->map->fill[c] * state->map->fill_solid_angle;
+    state->sequence = frame->sequence;
+    state->capture_time_ns = frame->capture_time_ns;
+    state->published_time_ns = gn_clock_get_monotonic_ns();
+    state->ms_map = to_ms(map_ns - start_ns);
+    state->ms_sh = to_ms(sh_ns - map_ns);
+    state->ms_lights = to_ms(state->published_time_ns - sh_ns);
+    return 0;
+}
+
+int gn_lighting_state_create(const struct gn_environment_frame *frame,
+                             const struct gn_radiance_map_options *map_options,
+                             const struct gn_light_options *options, struct gn_pool *pool,
+                             struct gn_lighting_state **out_state, struct gn_error *out_error)
+{
+    static const struct gn_light_options defaults = {0};
+    struct gn_radiance_map_options map_copy = {0};
+    *out_state = NULL;
+    if (!options)
+        options = &defaults;
+    if (map_options)
+        map_copy = *map_options;
+    if (!map_copy.previous && options->previous)
+        map_copy.previous = options->previous->map;
+    struct gn_lighting_state *state = calloc(1, sizeof(*state));
+    if (!state)
+        return gn_error_set(out_error, -ENOMEM, "lighting state: no memory");
+    atomic_init(&state->references, 1);
+    int rc = fill_state(state, frame, &map_copy, options, pool, out_error);
+    if (rc < 0) {
+        gn_lighting_state_unref(&state);
+        return rc;
+    }
+    *out_state = state;
+    return 0;
+}
+
+struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state)
+{
+    atomic_fetch_add_explicit(&state->references, 1, memory_order_relaxed);
+    return state;
+}
+
+void gn_lighting_state_unref(struct gn_lighting_state **state)
+{
+    struct gn_lighting_state *s = *state;
+    *state = NULL;
+    if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
+        return;
+    gn_partition_plan_unref(&s->plan);
+    gn_radiance_map_unref(&s->map);
+    free(s->lights);
+    free(s);
+}
