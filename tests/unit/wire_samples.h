@@ -14,7 +14,7 @@ static const struct gn_msg_transform sample_transform = {
     .position_m = {-1e6, 1e-300, 0.25},
 };
 
-static void sample_session(enum gn_wire_type type, union gn_wire_message *m)
+static inline void sample_session(enum gn_wire_type type, union gn_wire_message *m)
 {
     if (type == GN_WIRE_HELLO) {
         m->hello = (struct gn_msg_hello){
@@ -51,7 +51,7 @@ static void sample_session(enum gn_wire_type type, union gn_wire_message *m)
     }
 }
 
-static void sample_environment(struct gn_msg_environment_frame *m)
+static inline void sample_environment(struct gn_msg_environment_frame *m)
 {
     *m = (struct gn_msg_environment_frame){
         .sequence = UINT64_MAX,
@@ -72,7 +72,7 @@ static void sample_environment(struct gn_msg_environment_frame *m)
     };
 }
 
-static void sample_result(struct gn_msg_result *m)
+static inline void sample_result(struct gn_msg_result *m)
 {
     *m = (struct gn_msg_result){
         .id = 7,
@@ -108,7 +108,7 @@ static void sample_result(struct gn_msg_result *m)
 
 /** Fill *m with a valid message of that type, zero around it. Returns the payload's length that
  * goes with it. */
-static uint32_t sample_message(enum gn_wire_type type, union gn_wire_message *m)
+static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_message *m)
 {
     memset(m, 0, sizeof(*m));
     switch (type) {
