@@ -1,0 +1,255 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Values from text: each type's grammar, and the sentence that says what would be right. */
+#include "common/options.h"
+
+#include <arpa/inet.h>
+#include <ctype.h>
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "common/options_internal.h"
+#include "common/text.h"
+
+static bool is_bounded(const struct gn_option *option)
+{
+    return option->min != 0.0 || option->max != 0.0;
+}
+
+static bool is_in_range(const struct gn_option *option, double value)
+{
+    return !is_bounded(option) || (value >= option->min && value <= option->max);
+}
+
+static bool parse_bool(const char *text, bool *out_value)
+{
+    static const char *const words[] = {"false", "true", "no", "yes", "off", "on", "0", "1"};
+    for (int i = 0; i < 8; i++) {
+        if (strcasecmp(text, words[i]) == 0) {
+            *out_value = i % 2 == 1;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool parse_int(const char *text, int *out_value)
+{
+    char *end = NULL;
+    errno = 0;
+    long value = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || errno != 0 ||
+        value < INT_MIN || value > INT_MAX)
+        return false;
+    *out_value = (int)value;
+    return true;
+}
+
+/* Decimal only: strtod would take "nan", "inf" and hexadecimal. */
+static bool parse_double(const char *text, double *out_value)
+{
+    char *end = NULL;
+    if (text[0] == '\0' || strspn(text, "+-0123456789.eE") != strlen(text))
+        return false;
+    double value = strtod(text, &end);
+    if (end == text || *end != '\0' || !isfinite(value))
+        return false;
+    *out_value = value;
+    return true;
+}
+
+static bool parse_bytes(const char *text, uint64_t *out_value)
+{
+    static const char *const units[] = {"", "KiB", "MiB", "GiB", "TiB"};
+    char *end = NULL;
+    if (!isdigit((unsigned char)text[0]))
+        return false;
+    errno = 0;
+    unsigned long long value = strtoull(text, &end, 10);
+    if (errno != 0)
+        return false;
+    for (int i = 0; i < 5; i++) {
+        int shift = 10 * i;
+        if (strcmp(end, units[i]) == 0 && value <= UINT64_MAX >> shift) {
+            *out_value = (uint64_t)value << shift;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool parse_choice(const char *choices, const char *text, int *out_index)
+{
+    size_t length = strlen(text);
+    for (int i = 0;; i++) {
+        size_t n = strcspn(choices, "|");
+        if (n == length && strncmp(choices, text, n) == 0) {
+            *out_index = i;
+            return true;
+        }
+        if (choices[n] == '\0')
+            return false;
+        choices += n + 1;
+    }
+}
+
+int gn_address_parse(const char *text, struct gn_address *out_address)
+{
+    struct gn_address address = {0};
+    const char *host = text;
+    const char *colon = strrchr(text, ':');
+    int port = 0;
+    if (colon == NULL || colon == text || !isdigit((unsigned char)colon[1]) ||
+        !parse_int(colon + 1, &port) || port > 65535)
+        return -EINVAL;
+    size_t length = (size_t)(colon - text);
+    bool is_bracketed = text[0] == '[';
+    if (is_bracketed) {
+        if (colon[-1] != ']')
+            return -EINVAL;
+        host++;
+        length -= 2;
+    }
+    if (length < 1 || length >= sizeof(address.host))
+        return -EINVAL;
+    memcpy(address.host, host, length);
+    if (is_bracketed) {
+        struct in6_addr ignored;
+        if (inet_pton(AF_INET6, address.host, &ignored) != 1)
+            return -EINVAL;
+    } else {
+        for (size_t i = 0; i < length; i++)
+            if (!isalnum((unsigned char)host[i]) && strchr(".-_", host[i]) == NULL)
+                return -EINVAL;
+    }
+    address.port = (uint16_t)port;
+    *out_address = address;
+    return 0;
+}
+
+static bool parse_value(const struct gn_option *option, const char *text,
+                        struct gn_option_value *out_value)
+{
+    switch (option->type) {
+    case GN_OPTION_STRING:
+        return text[0] != '\0';
+    case GN_OPTION_BOOL:
+        return parse_bool(text, &out_value->as.boolean);
+    case GN_OPTION_INT:
+        return parse_int(text, &out_value->as.integer) &&
+               is_in_range(option, out_value->as.integer);
+    case GN_OPTION_DOUBLE:
+        return parse_double(text, &out_value->as.number) &&
+               is_in_range(option, out_value->as.number);
+    case GN_OPTION_ENUM:
+        return parse_choice(option->choices, text, &out_value->as.integer);
+    case GN_OPTION_BYTES:
+        return parse_bytes(text, &out_value->as.bytes) &&
+               is_in_range(option, (double)out_value->as.bytes);
+    case GN_OPTION_ADDRESS:
+        return gn_address_parse(text, &out_value->as.address) == 0;
+    }
+    return false;
+}
+
+/* 67108864 as "64MiB". */
+static void print_bytes(double value, size_t size, char *out)
+{
+    static const char *const units[] = {"", "KiB", "MiB", "GiB", "TiB"};
+    int unit = 0;
+    while (unit < 4 && value >= 1024.0 && fmod(value, 1024.0) == 0.0) {
+        value /= 1024.0;
+        unit++;
+    }
+    snprintf(out, size, "%.0f%s", value, units[unit]);
+}
+
+void gn_option_get_expectation(const struct gn_option *option, size_t size, char *out_text)
+{
+    char range[96] = "", low[32], high[32];
+    if (is_bounded(option) && option->type == GN_OPTION_BYTES) {
+        print_bytes(option->min, sizeof(low), low);
+        print_bytes(option->max, sizeof(high), high);
+        snprintf(range, sizeof(range), " in [%s, %s]", low, high);
+    } else if (is_bounded(option)) {
+        snprintf(range, sizeof(range), " in [%.10g, %.10g]", option->min, option->max);
+    }
+    switch (option->type) {
+    case GN_OPTION_STRING:
+        snprintf(out_text, size, "%s",
+                 option->value_name == NULL ? "text that is not empty" : option->value_name);
+        return;
+    case GN_OPTION_BOOL:
+        snprintf(out_text, size, "true or false");
+        return;
+    case GN_OPTION_INT:
+        snprintf(out_text, size, "a whole number%s", range);
+        return;
+    case GN_OPTION_DOUBLE:
+        snprintf(out_text, size, "a number%s", range);
+        return;
+    case GN_OPTION_ENUM: {
+        size_t n = (size_t)snprintf(out_text, size, "one of ");
+        for (const char *c = option->choices; *c != '\0' && n + 3 < size; c++) {
+            out_text[n++] = *c == '|' ? ',' : *c;
+            if (*c == '|')
+                out_text[n++] = ' ';
+        }
+        out_text[n] = '\0';
+        return;
+    }
+    case GN_OPTION_BYTES:
+        snprintf(out_text, size, "bytes%s, as 1048576, 512KiB, 64MiB or 2GiB", range);
+        return;
+    case GN_OPTION_ADDRESS:
+        snprintf(out_text, size, "HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7420");
+        return;
+    }
+}
+
+/* The choice that was meant, for the end of the sentence. */
+static void suggest_choice(const struct gn_option *option, const char *text, size_t size, char *out)
+{
+    char choice[64];
+    out[0] = '\0';
+    for (const char *c = option->type == GN_OPTION_ENUM ? option->choices : ""; *c != '\0';) {
+        size_t n = strcspn(c, "|");
+        const char *meant = NULL;
+        snprintf(choice, sizeof(choice), "%.*s", (int)n, c);
+        gn_text_suggest(text, choice, &meant);
+        if (meant != NULL) {
+            snprintf(out, size, "; did you mean '%s'?", choice);
+            return;
+        }
+        c += n + (c[n] == '|' ? 1 : 0);
+    }
+}
+
+int gn_options_set(const struct gn_options *options, struct gn_option_instance *instance, int index,
+                   const char *text, enum gn_option_rank rank, const char *where, const char *label,
+                   struct gn_error *out_error)
+{
+    const struct gn_option *option = &options->program->options[index];
+    struct gn_option_value *value = &instance->values[index];
+    struct gn_option_value new_value = {.rank = rank, .line = value->line};
+    if (!parse_value(option, text, &new_value)) {
+        char expected[256], meant[96];
+        gn_option_get_expectation(option, sizeof(expected), expected);
+        suggest_choice(option, text, sizeof(meant), meant);
+        return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s, found '%.80s'%s", where,
+                            label, expected, option->is_secret ? "(hidden)" : text, meant);
+    }
+    if (value->text != NULL && value->rank > rank)
+        return 0;
+    snprintf(new_value.source, sizeof(new_value.source), "%s", where);
+    new_value.text = strdup(text);
+    if (new_value.text == NULL)
+        return gn_error_set(out_error, -ENOMEM, "%s: out of memory", where);
+    free(value->text);
+    *value = new_value;
+    return 0;
+}
