@@ -126,11 +126,11 @@ bool gn_camera_get_ray(const struct gn_camera *camera, double x, double y,
                        double out_dir_camera[static 3])
 {
     double xy[2] = {(x - camera->cx) / camera->fx, (y - camera->cy) / camera->fy};
+    if (!isfinite(xy[0]) || !isfinite(xy[1]))
+        return false;
     if (has_distortion(camera->distortion) && !undistort(camera->distortion, xy[0], xy[1], xy))
         return false;
-    double norm = sqrt(xy[0] * xy[0] + xy[1] * xy[1] + 1.0);
-    if (!isfinite(norm))
-        return false;
+    double norm = hypot(hypot(xy[0], xy[1]), 1.0);
     out_dir_camera[0] = xy[0] / norm;
     out_dir_camera[1] = xy[1] / norm;
     out_dir_camera[2] = 1.0 / norm;
