@@ -25,8 +25,10 @@ struct gn_composite_layers {
 /**
  * 8-bit in, 8-bit out, RGB. The camera's response turns codes to radiance and back; a pixel that no
  * layer touches keeps its codes to the bit. encoded_multiply is the paper's literal reading: the
- * factor scales the codes themselves. out may be the background. Thread-safety: safe.
- * Returns 0 or -EINVAL where sizes or channels differ.
+ * factor scales the codes themselves. out has the background's size, and may be the background.
+ * The result does not depend on the pool. Thread-safety: safe.
+ * Returns 0 or -EINVAL where sizes or channels differ or the response is refused by
+ * gn_response_check.
  */
 GN_MUST_USE int gn_composite_srgb8(const struct gn_composite_layers *layers,
                                    const struct gn_image8 *background,

@@ -1,0 +1,164 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "common/composite.h"
+
+#include <errno.h>
+#include <stddef.h>
+
+/* Rows that one worker takes at a time. */
+#define ROWS 16
+
+/* One picture's work, shared by all workers. */
+struct job {
+    const struct gn_composite_layers *layers;
+    int width, height;
+    const struct gn_image8 *codes;
+    const struct gn_response *response;
+    bool encoded_multiply;
+    float linear[256];              // the response's curve at every code
+    struct gn_response matrix_only; // the response's matrix and scale
+    struct gn_image8 *out_codes;
+    const struct gn_image *radiance;
+    struct gn_image *out_radiance;
+};
+
+/* The layers at one pixel. */
+struct touch {
+    float shadow[3], added[3];
+    const float *rgba;
+};
+
+/* False where the pixel is left as it is. */
+static bool get_touch(const struct gn_composite_layers *layers, int x, int y, struct touch *out)
+{
+    const float *shadow = layers->shadow ? gn_image_at(layers->shadow, x, y) : NULL;
+    const float *added = layers->added ? gn_image_at(layers->added, x, y) : NULL;
+    out->rgba = gn_image_at(layers->virtual_rgba, x, y);
+    bool is_touched = false;
+    for (int c = 0; c < 3; c++) {
+        out->shadow[c] = shadow ? shadow[c] : 1;
+        out->added[c] = added ? added[c] : 0;
+        is_touched = is_touched || out->shadow[c] != 1 || out->added[c] != 0 || out->rgba[c] != 0;
+    }
+    return is_touched || out->rgba[3] != 0;
+}
+
+/* rgb: shadowed background in, composite out. */
+static void blend(const struct touch *t, float rgb[static 3])
+{
+    for (int c = 0; c < 3; c++)
+        rgb[c] = (rgb[c] + t->added[c]) * (1 - t->rgba[3]) + t->rgba[c];
+}
+
+static uint8_t to_code8(float code)
+{
+    return (uint8_t)(code * 255 + 0.5f); // code is in [0, 1]
+}
+
+static void blend_codes8(const struct job *job, const struct touch *t, const uint8_t *in,
+                         uint8_t *out)
+{
+    float rgb[3];
+    for (int c = 0; c < 3; c++)
+        rgb[c] = job->encoded_multiply
+                     ? gn_response_decode(job->response, (float)in[c] / 255 * t->shadow[c])
+                     : job->linear[in[c]];
+    gn_response_to_radiance(&job->matrix_only, rgb, 1);
+    if (!job->encoded_multiply)
+        for (int c = 0; c < 3; c++)
+            rgb[c] *= t->shadow[c];
+    blend(t, rgb);
+    gn_response_from_radiance(job->response, rgb, 1);
+    for (int c = 0; c < 3; c++)
+        out[c] = to_code8(rgb[c]);
+}
+
+static void composite_codes8_rows(void *context, int item, int worker)
+{
+    (void)worker;
+    const struct job *job = context;
+    for (int y = item * ROWS; y < (item + 1) * ROWS && y < job->height; y++) {
+        for (int x = 0; x < job->width; x++) {
+            const uint8_t *in = gn_image8_at(job->codes, x, y);
+            uint8_t *out = gn_image8_at(job->out_codes, x, y);
+            struct touch t;
+            if (get_touch(job->layers, x, y, &t)) {
+                blend_codes8(job, &t, in, out);
+                continue;
+            }
+            for (int c = 0; c < 3; c++)
+                out[c] = in[c];
+        }
+    }
+}
+
+static void composite_linear_rows(void *context, int item, int worker)
+{
+    (void)worker;
+    const struct job *job = context;
+    for (int y = item * ROWS; y < (item + 1) * ROWS && y < job->height; y++) {
+        for (int x = 0; x < job->width; x++) {
+            const float *in = gn_image_at(job->radiance, x, y);
+            float *out = gn_image_at(job->out_radiance, x, y);
+            struct touch t;
+            bool is_touched = get_touch(job->layers, x, y, &t);
+            for (int c = 0; c < 3; c++)
+                out[c] = is_touched ? in[c] * t.shadow[c] : in[c];
+            if (is_touched)
+                blend(&t, out);
+        }
+    }
+}
+
+static bool has_shape(const struct gn_image *image, int width, int height, int channels)
+{
+    return image->data && image->width == width && image->height == height &&
+           image->channels == channels;
+}
+
+static bool are_layers_ok(const struct gn_composite_layers *layers, int width, int height)
+{
+    return layers->virtual_rgba && has_shape(layers->virtual_rgba, width, height, 4) &&
+           (!layers->shadow || has_shape(layers->shadow, width, height, 3)) &&
+           (!layers->added || has_shape(layers->added, width, height, 3));
+}
+
+int gn_composite_srgb8(const struct gn_composite_layers *layers, const struct gn_image8 *background,
+                       const struct gn_response *response, bool encoded_multiply,
+                       struct gn_pool *pool, struct gn_image8 *out)
+{
+    int width = background->width, height = background->height;
+    if (!background->data || background->channels != 3 || !out->data || out->channels != 3 ||
+        out->width != width || out->height != height || !are_layers_ok(layers, width, height) ||
+        gn_response_check(response, NULL))
+        return -EINVAL;
+    struct job job = {.layers = layers,
+                      .width = width,
+                      .height = height,
+                      .codes = background,
+                      .response = response,
+                      .matrix_only = *response,
+                      .encoded_multiply = encoded_multiply,
+                      .out_codes = out};
+    job.matrix_only.type = GN_RESPONSE_LINEAR;
+    for (int i = 0; i < 256; i++)
+        job.linear[i] = gn_response_decode(response, (float)i / 255);
+    gn_pool_run(pool, (height + ROWS - 1) / ROWS, composite_codes8_rows, &job);
+    return 0;
+}
+
+int gn_composite_linear(const struct gn_composite_layers *layers, const struct gn_image *background,
+                        struct gn_pool *pool, struct gn_image *out)
+{
+    int width = background->width, height = background->height;
+    if (!has_shape(background, width, height, 3) || !has_shape(out, width, height, 3) ||
+        !are_layers_ok(layers, width, height))
+        return -EINVAL;
+    struct job job = {.layers = layers,
+                      .width = width,
+                      .height = height,
+                      .radiance = background,
+                      .out_radiance = out};
+    gn_pool_run(pool, (height + ROWS - 1) / ROWS, composite_linear_rows, &job);
+    return 0;
+}
