@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/device_json.h"
 #include "common/image.h"
-#include "common/json.h"
 
 /* Source: Brown 1971, in the form and order of OpenCV's calib3d: k1, k2, p1, p2, k3. */
 struct distorted {
@@ -160,93 +160,13 @@ bool gn_camera_project(const struct gn_camera *camera, const double point_camera
     return true;
 }
 
-static int read_response(const struct gn_json *root, struct gn_response *out,
-                         struct gn_error *out_error)
-{
-    /* The types that a file can describe; their order is the enum's. */
-    static const char *const types[] = {"linear", "srgb", "gamma", "log"};
-    static const char *const keys[][4] = {
-        {"type"}, {"type"}, {"type", "gamma"}, {"type", "a", "b", "c"}};
-    static const size_t n_keys[] = {1, 1, 2, 4};
-    struct gn_json object;
-    int type = 0;
-    int ret = gn_json_get_object(root, "response", &object, out_error);
-    if (ret == 0)
-        ret = gn_json_get_enum(&object, "type", types, GN_ARRAY_LEN(types), &type, out_error);
-    if (ret < 0)
-        return ret;
-    out->type = (enum gn_response_type)type;
-    ret = gn_json_check_keys(&object, keys[type], n_keys[type], out_error);
-    if (ret == 0 && out->type == GN_RESPONSE_GAMMA)
-        ret = gn_json_get_double(&object, "gamma", 0.1, 10.0, &out->gamma, out_error);
-    if (ret < 0 || out->type != GN_RESPONSE_LOG)
-        return ret;
-    ret = gn_json_get_double(&object, "a", -1e6, 1e6, &out->log_a, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(&object, "b", DBL_MIN, 1e6, &out->log_b, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(&object, "c", 0.0, 1e6, &out->log_c, out_error);
-    return ret;
-}
-
-static int read_intrinsics(const struct gn_json *root, struct gn_camera *out,
-                           struct gn_error *out_error)
-{
-    int ret = gn_json_get_int(root, "width", 1, GN_IMAGE_MAX_SIDE, &out->width, out_error);
-    if (ret == 0)
-        ret = gn_json_get_int(root, "height", 1, GN_IMAGE_MAX_SIDE, &out->height, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(root, "fx", 1e-6, 1e6, &out->fx, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(root, "fy", 1e-6, 1e6, &out->fy, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(root, "cx", -1e6, 1e6, &out->cx, out_error);
-    if (ret == 0)
-        ret = gn_json_get_double(root, "cy", -1e6, 1e6, &out->cy, out_error);
-    if (ret == 0)
-        ret = gn_json_get_numbers(root, "distortion", 5, out->distortion, out_error);
-    return ret;
-}
-
-static int read_camera(const struct gn_json *root, struct gn_camera *out,
-                       struct gn_error *out_error)
-{
-    static const char *const keys[] = {"width",    "height",    "fx",         "fy",
-                                       "cx",       "cy",        "distortion", "world_from_camera",
-                                       "response", "to_rec709", "scale"};
-    double m[16];
-    const char *reason = NULL;
-    struct gn_camera camera = {.response = {.type = GN_RESPONSE_SRGB}};
-    int ret = gn_json_check_keys(root, keys, GN_ARRAY_LEN(keys), out_error);
-    if (ret == 0)
-        ret = read_intrinsics(root, &camera, out_error);
-    if (ret == 0)
-        ret = gn_json_get_numbers(root, "world_from_camera", 16, m, out_error);
-    if (ret < 0)
-        return ret;
-    if (gn_pose_from_matrix(m, &camera.world_from_camera, &reason) < 0)
-        return gn_json_refuse(root, "world_from_camera", out_error, "not a pose: %s", reason);
-    if (gn_json_has(root, "response"))
-        ret = read_response(root, &camera.response, out_error);
-    if (ret == 0 && gn_json_has(root, "to_rec709"))
-        ret = gn_json_get_numbers(root, "to_rec709", 9, camera.response.to_rec709, out_error);
-    if (ret == 0 && gn_json_has(root, "scale"))
-        ret = gn_json_get_double(root, "scale", 1e-12, 1e12, &camera.response.scale, out_error);
-    if (ret < 0)
-        return ret;
-    if (gn_camera_check(&camera, &reason) < 0)
-        return gn_json_refuse(root, NULL, out_error, "%s", reason);
-    *out = camera;
-    return 0;
-}
-
 int gn_camera_read_file(const char *path, struct gn_camera *out_camera, struct gn_error *out_error)
 {
     struct gn_json root;
     int ret = gn_json_load_file(path, &root, out_error);
     if (ret < 0)
         return ret;
-    ret = read_camera(&root, out_camera, out_error);
+    ret = gn_camera_read_json(&root, true, out_camera, out_error);
     gn_json_finish(&root);
     return ret;
 }

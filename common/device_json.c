@@ -1,0 +1,196 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "common/device_json.h"
+
+#include <errno.h>
+#include <float.h>
+#include <string.h>
+
+#include "common/image.h"
+
+static int read_curve(const struct gn_json *root, struct gn_response *out,
+                      struct gn_error *out_error)
+{
+    /* The types that a file can describe; their order is the enum's. */
+    static const char *const types[] = {"linear", "srgb", "gamma", "log"};
+    static const char *const keys[][4] = {
+        {"type"}, {"type"}, {"type", "gamma"}, {"type", "a", "b", "c"}};
+    static const size_t n_keys[] = {1, 1, 2, 4};
+    struct gn_json object;
+    int type = 0;
+    int ret = gn_json_get_object(root, "response", &object, out_error);
+    if (ret == 0)
+        ret = gn_json_get_enum(&object, "type", types, GN_ARRAY_LEN(types), &type, out_error);
+    if (ret < 0)
+        return ret;
+    out->type = (enum gn_response_type)type;
+    ret = gn_json_check_keys(&object, keys[type], n_keys[type], out_error);
+    if (ret == 0 && out->type == GN_RESPONSE_GAMMA)
+        ret = gn_json_get_double(&object, "gamma", 0.1, 10.0, &out->gamma, out_error);
+    if (ret < 0 || out->type != GN_RESPONSE_LOG)
+        return ret;
+    ret = gn_json_get_double(&object, "a", -1e6, 1e6, &out->log_a, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(&object, "b", DBL_MIN, 1e6, &out->log_b, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(&object, "c", 0.0, 1e6, &out->log_c, out_error);
+    return ret;
+}
+
+static int read_intrinsics(const struct gn_json *root, struct gn_camera *out,
+                           struct gn_error *out_error)
+{
+    int ret = gn_json_get_int(root, "width", 1, GN_IMAGE_MAX_SIDE, &out->width, out_error);
+    if (ret == 0)
+        ret = gn_json_get_int(root, "height", 1, GN_IMAGE_MAX_SIDE, &out->height, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(root, "fx", 1e-6, 1e6, &out->fx, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(root, "fy", 1e-6, 1e6, &out->fy, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(root, "cx", -1e6, 1e6, &out->cx, out_error);
+    if (ret == 0)
+        ret = gn_json_get_double(root, "cy", -1e6, 1e6, &out->cy, out_error);
+    if (ret == 0)
+        ret = gn_json_get_numbers(root, "distortion", 5, out->distortion, out_error);
+    return ret;
+}
+
+int gn_response_read_json(const struct gn_json *object, struct gn_response *response,
+                          struct gn_error *out_error)
+{
+    struct gn_response r = *response;
+    int ret = 0;
+    if (gn_json_has(object, "response"))
+        ret = read_curve(object, &r, out_error);
+    if (ret == 0 && gn_json_has(object, "to_rec709"))
+        ret = gn_json_get_numbers(object, "to_rec709", 9, r.to_rec709, out_error);
+    if (ret == 0 && gn_json_has(object, "scale"))
+        ret = gn_json_get_double(object, "scale", 1e-12, 1e12, &r.scale, out_error);
+    const char *reason = NULL;
+    if (ret == 0 && gn_response_check(&r, &reason) < 0)
+        ret = gn_json_refuse(object, "response", out_error, "%s", reason);
+    if (ret == 0)
+        *response = r;
+    return ret;
+}
+
+int gn_pose_read_json(const struct gn_json *object, const char *key, struct gn_pose *out_pose,
+                      struct gn_error *out_error)
+{
+    double m[16];
+    const char *reason = NULL;
+    int ret = gn_json_get_numbers(object, key, 16, m, out_error);
+    if (ret == 0 && gn_pose_from_matrix(m, out_pose, &reason) < 0)
+        ret = gn_json_refuse(object, key, out_error, "not a pose: %s", reason);
+    return ret;
+}
+
+int gn_camera_read_json(const struct gn_json *object, bool needs_pose, struct gn_camera *out_camera,
+                        struct gn_error *out_error)
+{
+    static const char *const keys[] = {
+        "width",      "height",           "fx", "fy", "cx", "cy", "response", "to_rec709", "scale",
+        "distortion", "world_from_camera"};
+    struct gn_camera camera = {.response = {.type = GN_RESPONSE_SRGB},
+                               .world_from_camera = {.rotation = {1.0}}};
+    int ret =
+        gn_json_check_keys(object, keys, GN_ARRAY_LEN(keys) - (needs_pose ? 0 : 1), out_error);
+    if (ret == 0)
+        ret = read_intrinsics(object, &camera, out_error);
+    if (ret == 0 && needs_pose)
+        ret = gn_pose_read_json(object, "world_from_camera", &camera.world_from_camera, out_error);
+    if (ret == 0)
+        ret = gn_response_read_json(object, &camera.response, out_error);
+    const char *reason = NULL;
+    if (ret == 0 && gn_camera_check(&camera, &reason) < 0)
+        ret = gn_json_refuse(object, NULL, out_error, "%s", reason);
+    if (ret == 0)
+        *out_camera = camera;
+    return ret;
+}
+
+void gn_probe_setup_init(struct gn_probe_setup *setup)
+{
+    memset(setup, 0, sizeof(*setup));
+    setup->projection.type = GN_PROJECTION_LATLONG;
+    setup->world_from_probe.rotation[0] = 1.0;
+}
+
+static int read_projection(const struct gn_json *object, struct gn_projection *out,
+                           struct gn_error *out_error)
+{
+    const char *name = NULL;
+    int ret = gn_json_get_string(object, "projection", &name, out_error);
+    if (ret == 0 && gn_projection_from_name(name, &out->type) < 0)
+        ret = gn_json_refuse(object, "projection", out_error,
+                             "'%s' is none; right would be one of latlong, angular, mirrorball, "
+                             "fisheye-equidistant, fisheye-equisolid, fisheye-orthographic, "
+                             "fisheye-stereographic, fisheye-kannala-brandt",
+                             name);
+    if (ret == 0 && gn_json_has(object, "width"))
+        ret = gn_json_get_int(object, "width", 1, GN_IMAGE_MAX_SIDE, &out->width, out_error);
+    if (ret == 0 && gn_json_has(object, "height"))
+        ret = gn_json_get_int(object, "height", 1, GN_IMAGE_MAX_SIDE, &out->height, out_error);
+    if (ret == 0 && gn_json_has(object, "center"))
+        ret = gn_json_get_numbers(object, "center", 2, out->center, out_error);
+    if (ret == 0 && gn_json_has(object, "radius"))
+        ret = gn_json_get_double(object, "radius", 1e-3, 1e6, &out->radius, out_error);
+    if (ret == 0 && gn_json_has(object, "theta_max"))
+        ret = gn_json_get_double(object, "theta_max", 1e-3, 3.1415926535897936, &out->theta_max,
+                                 out_error);
+    if (ret == 0 && gn_json_has(object, "k"))
+        ret = gn_json_get_numbers(object, "k", 4, out->k, out_error);
+    return ret;
+}
+
+static int read_place(const struct gn_json *object, struct gn_pose *out, struct gn_error *out_error)
+{
+    int ret = 0;
+    if (gn_json_has(object, "orientation"))
+        ret = gn_json_get_numbers(object, "orientation", 4, out->rotation, out_error);
+    if (ret == 0 && gn_pose_normalize(out) < 0)
+        ret = gn_json_refuse(object, "orientation", out_error,
+                             "not a unit quaternion w, x, y, z (norm within 10 %% of 1)");
+    if (ret == 0 && gn_json_has(object, "position"))
+        ret = gn_json_get_numbers(object, "position", 3, out->translation, out_error);
+    return ret;
+}
+
+int gn_probe_setup_read_json(const struct gn_json *object, struct gn_probe_setup *out_setup,
+                             struct gn_error *out_error)
+{
+    static const char *const keys[] = {
+        "projection",   "width",    "height",    "center", "radius",      "theta_max", "k",
+        "pixel_format", "response", "to_rec709", "scale",  "orientation", "position"};
+    static const char *const formats[] = {"float32", "log12", "linear16"};
+    struct gn_probe_setup setup;
+    gn_probe_setup_init(&setup);
+    int format = 0;
+    int ret = gn_json_check_keys(object, keys, GN_ARRAY_LEN(keys), out_error);
+    if (ret == 0)
+        ret = read_projection(object, &setup.projection, out_error);
+    if (ret == 0 && gn_json_has(object, "pixel_format"))
+        ret = gn_json_get_enum(object, "pixel_format", formats, GN_ARRAY_LEN(formats), &format,
+                               out_error);
+    setup.is_12_bit = format == 1;
+    if (ret == 0)
+        ret = gn_response_read_json(object, &setup.response, out_error);
+    if (ret == 0)
+        ret = read_place(object, &setup.world_from_probe, out_error);
+    if (ret == 0)
+        *out_setup = setup;
+    return ret;
+}
+
+int gn_probe_setup_read_file(const char *path, struct gn_probe_setup *out_setup,
+                             struct gn_error *out_error)
+{
+    struct gn_json root;
+    int ret = gn_json_load_file(path, &root, out_error);
+    if (ret < 0)
+        return ret;
+    ret = gn_probe_setup_read_json(&root, out_setup, out_error);
+    gn_json_finish(&root);
+    return ret;
+}
