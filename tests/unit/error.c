@@ -68,7 +68,9 @@ static void test_suggest(void **unused)
 {
     (void)unused;
     assert_int_equal(gn_text_get_distance("kitten", "sitting"), 3);
+    assert_int_equal(gn_text_get_distance("sitting", "kitten"), 3);
     assert_int_equal(gn_text_get_distance("", "abc"), 3);
+    assert_int_equal(gn_text_get_distance("abcd", "ad"), 2);
     assert_int_equal(gn_text_get_distance("ABC", "abc"), 0);
     assert_string_equal(suggest("lisen"), "listen");
     assert_string_equal(suggest("max-session"), "max-sessions");

@@ -342,13 +342,15 @@ static void test_secret(void **unused)
 {
     (void)unused;
     static const struct gn_option secret[] = {
-        {.section = "a", .key = "pin", .type = GN_OPTION_INT, .is_secret = true, .help = "Pin."}};
-    static const struct gn_program small = {.name = "p", .options = secret, .n_options = 1};
+        {.section = "a", .key = "pin", .type = GN_OPTION_INT, .is_secret = true, .help = "Pin."},
+        {.section = "a", .key = "mode", .type = GN_OPTION_ENUM, .choices = "x|y", .help = "M."}};
+    static const struct gn_program small = {.name = "p", .options = secret, .n_options = 2};
     struct gn_options *o = NULL;
     struct gn_error e = {0};
     assert_int_equal(gn_options_create(&small, &o), 0);
     assert_int_equal(gn_options_read_text(o, "[a]\npin = hunter2\n", "g.ini", &e), -EINVAL);
     assert_null(strstr(e.text, "hunter2"));
+    assert_int_equal(gn_options_get_enum(o, "a", NULL, "mode"), -1);
     gn_options_destroy(&o);
 }
 

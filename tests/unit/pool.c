@@ -117,26 +117,32 @@ static void test_nested_on_another_pool(void **unused)
     gn_pool_destroy(&inner);
 }
 
+struct meeting {
+    atomic_int n_present;
+    atomic_uint workers; // a bit for each
+};
+
 static void meet(void *context, int item, int worker)
 {
+    struct meeting *meeting = context;
     (void)item;
-    (void)worker;
-    atomic_int *n_present = context;
-    atomic_fetch_add(n_present, 1);
-    while (atomic_load(n_present) < 3)
+    atomic_fetch_or(&meeting->workers, 1u << worker);
+    atomic_fetch_add(&meeting->n_present, 1);
+    while (atomic_load(&meeting->n_present) < 3)
         ;
 }
 
-/* Three items that wait for one another end only if three workers run at once. */
+/* Three items that wait for one another end only if three workers, all different, run at once. */
 static void test_runs_in_parallel(void **unused)
 {
     (void)unused;
     struct gn_pool *pool = NULL;
     assert_int_equal(gn_pool_create(3, &pool), 0);
     for (int i = 0; i < 50; i++) {
-        atomic_int n_present = 0;
-        gn_pool_run(pool, 3, meet, &n_present);
-        assert_int_equal(atomic_load(&n_present), 3);
+        struct meeting meeting = {0};
+        gn_pool_run(pool, 3, meet, &meeting);
+        assert_int_equal(atomic_load(&meeting.n_present), 3);
+        assert_int_equal(atomic_load(&meeting.workers), 7);
     }
     gn_pool_destroy(&pool);
 }
