@@ -57,6 +57,7 @@ const struct gn_wire_info *gn_wire_get_info(uint16_t type)
     return NULL;
 }
 
+GN_PRINTF(3, 0)
 static int refuse_as(int err, struct gn_wire_fault *fault, const char *format, va_list args)
 {
     if (fault)

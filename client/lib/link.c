@@ -1,0 +1,118 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Whole messages over a non-blocking socket, each call with a deadline. */
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "client/lib/client.h"
+#include "common/clock.h"
+
+int gn_client_fail(struct gn_wire_fault *why, int err, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    if (why)
+        vsnprintf(why->text, sizeof(why->text), format, args);
+    va_end(args);
+    return err;
+}
+
+int gn_client_lose(struct gn_client *client, int err, const char *text)
+{
+    gn_client_fail(&client->fault, err, "%s", text);
+    client->lost = err;
+    return err;
+}
+
+int64_t gn_client_get_deadline(int timeout_ms)
+{
+    return timeout_ms < 0 ? INT64_MAX : gn_clock_get_monotonic_ns() + timeout_ms * GN_NS_PER_MS;
+}
+
+/** Wait for the socket. Returns 1 ready, 0 deadline passed, negative errno. */
+static int wait_fd(int fd, short events, int64_t deadline_ns)
+{
+    for (;;) {
+        int64_t left = deadline_ns == INT64_MAX ? -1 : deadline_ns - gn_clock_get_monotonic_ns();
+        int ms = -1;
+        if (deadline_ns != INT64_MAX) {
+            int64_t up = left <= 0 ? 0 : (left + GN_NS_PER_MS - 1) / GN_NS_PER_MS;
+            ms = up > 60000 ? 60000 : (int)up;
+        }
+        struct pollfd p = {.fd = fd, .events = events};
+        int n = poll(&p, 1, ms);
+        if (n > 0)
+            return 1;
+        if (n < 0 && errno != EINTR)
+            return -errno;
+        if (deadline_ns != INT64_MAX && gn_clock_get_monotonic_ns() >= deadline_ns)
+            return 0;
+    }
+}
+
+static int flush_all(struct gn_client *client)
+{
+    int64_t deadline = gn_client_get_deadline(client->timeout_ms);
+    for (;;) {
+        int n = gn_conn_flush(client->conn);
+        if (n < 0)
+            return gn_client_lose(client, n, "the connection broke while sending");
+        client->last_sent_ns = gn_clock_get_monotonic_ns();
+        if (n > 0)
+            return 0;
+        n = wait_fd(gn_conn_get_fd(client->conn), POLLOUT, deadline);
+        if (n == 0)
+            return gn_client_lose(client, -ETIMEDOUT, "the server takes no more data");
+        if (n < 0)
+            return gn_client_lose(client, n, "cannot wait for the socket");
+    }
+}
+
+static void release_borrowed(struct gn_buf *buf)
+{
+    (void)buf; // the struct is on gn_client_send()'s stack, the bytes are the caller's
+}
+
+int gn_client_send(struct gn_client *client, enum gn_wire_type type, const void *msg,
+                   const void *payload, size_t payload_bytes)
+{
+    if (client->lost)
+        return client->lost;
+    struct gn_buf buf;
+    // Nothing writes through a queued payload.
+    gn_buf_init(&buf, (uint8_t *)(uintptr_t)payload, payload_bytes, release_borrowed, NULL);
+    int err = gn_conn_send(client->conn, type, msg, payload_bytes ? &buf : NULL, &client->fault);
+    if (!err)
+        err = flush_all(client);
+    if (err && gn_conn_get_queued_bytes(client->conn) > 0)
+        gn_conn_drop_queued(client->conn); // buf goes out of scope
+    return err;
+}
+
+int gn_client_receive(struct gn_client *client, int64_t deadline_ns, struct gn_conn_message *out)
+{
+    if (client->lost)
+        return client->lost;
+    for (;;) {
+        int n = gn_conn_read(client->conn, out);
+        if (n > 0)
+            return n;
+        if (n < 0)
+            return gn_client_lose(client, n, gn_conn_get_fault(client->conn));
+        n = wait_fd(gn_conn_get_fd(client->conn), POLLIN, deadline_ns);
+        if (n == 0)
+            return 0;
+        if (n < 0)
+            return gn_client_lose(client, n, "cannot wait for the socket");
+    }
+}
+
+int gn_client_decode(struct gn_client *client, const struct gn_conn_message *message,
+                     union gn_wire_message *out)
+{
+    struct gn_wire_fault fault;
+    int err = gn_conn_decode(message, out, &fault);
+    return err ? gn_client_lose(client, -EPROTO, fault.text) : 0;
+}
