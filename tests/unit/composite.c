@@ -1,0 +1,157 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Compositing: (shadow * background + added) * (1 - A) + virtual, in linear light. */
+#include "common/composite.h"
+
+#include <errno.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 16, HEIGHT = 50 }; // rows for several items of the pool, the last one short
+
+/* Layers that leave every pixel alone, and a background of all codes. */
+struct fixture {
+    struct gn_image rgba, shadow, added;
+    struct gn_image8 background, out;
+    struct gn_composite_layers layers;
+};
+
+static int set_up(void **state)
+{
+    static struct fixture f;
+    assert_int_equal(gn_image_init(&f.rgba, WIDTH, HEIGHT, 4), 0);
+    assert_int_equal(gn_image_init(&f.shadow, WIDTH, HEIGHT, 3), 0);
+    assert_int_equal(gn_image_init(&f.added, WIDTH, HEIGHT, 3), 0);
+    assert_int_equal(gn_image8_init(&f.background, WIDTH, HEIGHT, 3), 0);
+    assert_int_equal(gn_image8_init(&f.out, WIDTH, HEIGHT, 3), 0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        f.shadow.data[i] = 1;
+        f.background.data[i] = (uint8_t)i;
+    }
+    f.layers = (struct gn_composite_layers){&f.rgba, &f.shadow, &f.added};
+    *state = &f;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    struct fixture *f = *state;
+    gn_image_finish(&f->rgba);
+    gn_image_finish(&f->shadow);
+    gn_image_finish(&f->added);
+    gn_image8_finish(&f->background);
+    gn_image8_finish(&f->out);
+    return 0;
+}
+
+/* A response that would not give all codes back leaves them alone where no layer touches them. */
+static void test_untouched(void **state)
+{
+    struct fixture *f = *state;
+    static const float coarse[2] = {0, 1};
+    struct gn_response r = {.type = GN_RESPONSE_TABLE,
+                            .table = coarse,
+                            .table_size = 2,
+                            .to_rec709 = {2, -1, 0, 0, 1, 0, 0, 0, 1}};
+    for (int e = 0; e < 2; e++) {
+        memset(f->out.data, 9, WIDTH * HEIGHT * 3);
+        assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, e, NULL, &f->out), 0);
+        assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
+    }
+    f->layers.shadow = f->layers.added = NULL;
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out), 0);
+    assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
+}
+
+/* Half the light on sRGB 188 is 137; half the code, the paper's literal reading, is 94. */
+static void test_shadow_on_srgb(void **state)
+{
+    struct fixture *f = *state;
+    struct gn_response srgb = {.type = GN_RESPONSE_SRGB, .scale = 3};
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        f->background.data[i] = 188;
+        f->shadow.data[i] = 0.5f;
+    }
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &srgb, false, NULL, &f->out),
+                     0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
+        assert_int_equal(f->out.data[i], 137);
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &srgb, true, NULL, &f->out), 0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
+        assert_int_equal(f->out.data[i], 94);
+}
+
+/* All terms at once, each channel its own, against the formula; in place; on a pool too. */
+static void test_formula(void **state)
+{
+    struct fixture *f = *state;
+    struct gn_image radiance, out;
+    assert_int_equal(gn_image_init(&radiance, WIDTH, HEIGHT, 3), 0);
+    assert_int_equal(gn_image_init(&out, WIDTH, HEIGHT, 3), 0);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        f->rgba.data[4 * i + 3] = (float)(i % 5) / 4;
+        for (int c = 0; c < 3; c++) {
+            radiance.data[3 * i + c] = (float)(i + c);
+            f->rgba.data[4 * i + c] = (float)(i % 3 + c) / 8;
+            f->shadow.data[3 * i + c] = (float)((i + c) % 4) / 4;
+            f->added.data[3 * i + c] = (float)((i + 2 * c) % 6) / 2;
+        }
+    }
+    assert_int_equal(gn_composite_linear(&f->layers, &radiance, NULL, &out), 0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        float a = f->rgba.data[i / 3 * 4 + 3], v = f->rgba.data[i / 3 * 4 + i % 3];
+        float expected = (f->shadow.data[i] * radiance.data[i] + f->added.data[i]) * (1 - a) + v;
+        assert_true(out.data[i] == expected); // all numbers are short: exact in float
+    }
+    struct gn_pool *pool;
+    assert_int_equal(gn_pool_create(3, &pool), 0);
+    assert_int_equal(gn_composite_linear(&f->layers, &radiance, pool, &radiance), 0);
+    assert_memory_equal(radiance.data, out.data, WIDTH * HEIGHT * 3 * sizeof(float));
+    /* The 8-bit way, through a linear response of 1/16 radiance per code step. */
+    struct gn_response linear = {.scale = 255.0 / 16};
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &linear, false, pool, &f->out),
+                     0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        double a = (double)f->rgba.data[i / 3 * 4 + 3], v = (double)f->rgba.data[i / 3 * 4 + i % 3];
+        double x = f->background.data[i] / 16.0;
+        x = ((double)f->shadow.data[i] * x + (double)f->added.data[i]) * (1 - a) + v;
+        assert_true(fabs(fmin(x * 16, 255) - f->out.data[i]) <= 0.501);
+    }
+    gn_pool_destroy(&pool);
+    gn_image_finish(&radiance);
+    gn_image_finish(&out);
+}
+
+static void test_refusals(void **state)
+{
+    struct fixture *f = *state;
+    struct gn_response r = {0};
+    struct gn_image small;
+    assert_int_equal(gn_image_init(&small, WIDTH, HEIGHT - 1, 3), 0);
+    f->layers.added = &small;
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out),
+                     -EINVAL);
+    assert_int_equal(gn_composite_linear(&f->layers, &small, NULL, &small), -EINVAL);
+    f->layers.added = NULL;
+    r.scale = -1;
+    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out),
+                     -EINVAL);
+    gn_image_finish(&small);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_untouched, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_shadow_on_srgb, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_formula, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_refusals, set_up, tear_down),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
