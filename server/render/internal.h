@@ -215,13 +215,13 @@ void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sam
 
 /* light_list.c */
 
-GN_MUST_USE int gn_light_list_reserve(struct light_list *list, int capacity);
-void gn_light_list_finish(struct light_list *list);
-void gn_light_list_add(struct light_list *list, const double dir[static 3],
-                       const double irradiance[static 3]);
+GN_MUST_USE int gn_render_lights_reserve(struct light_list *list, int capacity);
+void gn_render_lights_finish(struct light_list *list);
+void gn_render_lights_add(struct light_list *list, const double dir[static 3],
+                          const double irradiance[static 3]);
 /** Fills list from the state's lights; dark ones are left out. */
-GN_MUST_USE int gn_light_list_from_state(const struct gn_lighting_state *state,
-                                         struct light_list *list);
+GN_MUST_USE int gn_render_lights_from_state(const struct gn_lighting_state *state,
+                                            struct light_list *list);
 
 /* packet.c: rays into packets of 16 */
 

@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-int gn_light_list_reserve(struct light_list *list, int capacity)
+int gn_render_lights_reserve(struct light_list *list, int capacity)
 {
     list->n = 0;
     memset(list->total, 0, sizeof(list->total));
     if (capacity <= list->capacity)
         return 0;
-    gn_light_list_finish(list);
+    gn_render_lights_finish(list);
     size_t size = (size_t)capacity;
     float *block = malloc(6 * size * sizeof(*block));
     double *cdf = malloc(size * sizeof(*cdf));
@@ -30,15 +30,15 @@ int gn_light_list_reserve(struct light_list *list, int capacity)
     return 0;
 }
 
-void gn_light_list_finish(struct light_list *list)
+void gn_render_lights_finish(struct light_list *list)
 {
     free(list->dir[0]); // one block for all six
     free(list->cdf);
     memset(list, 0, sizeof(*list));
 }
 
-void gn_light_list_add(struct light_list *list, const double dir[static 3],
-                       const double irradiance[static 3])
+void gn_render_lights_add(struct light_list *list, const double dir[static 3],
+                          const double irradiance[static 3])
 {
     if (!(irradiance[0] > 0 || irradiance[1] > 0 || irradiance[2] > 0))
         return;
@@ -50,9 +50,9 @@ void gn_light_list_add(struct light_list *list, const double dir[static 3],
     list->n++;
 }
 
-int gn_light_list_from_state(const struct gn_lighting_state *state, struct light_list *list)
+int gn_render_lights_from_state(const struct gn_lighting_state *state, struct light_list *list)
 {
-    int ret = gn_light_list_reserve(list, GN_LIGHTS_MAX);
+    int ret = gn_render_lights_reserve(list, GN_LIGHTS_MAX);
     if (ret < 0)
         return ret;
     for (int i = 0; i < state->n_lights; i++) {
@@ -60,7 +60,7 @@ int gn_light_list_from_state(const struct gn_lighting_state *state, struct light
         const double dir[3] = {light->dir_world[0], light->dir_world[1], light->dir_world[2]};
         const double irradiance[3] = {light->irradiance[0], light->irradiance[1],
                                       light->irradiance[2]};
-        gn_light_list_add(list, dir, irradiance);
+        gn_render_lights_add(list, dir, irradiance);
     }
     return 0;
 }

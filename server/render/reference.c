@@ -59,7 +59,7 @@ static void add_texel(const struct gn_radiance_map *map, int x, int y, double to
     for (int k = 0; k < 3; k++)
         irradiance[k] /= n_shown;
     for (int part = 0; part < n_shown; part++)
-        gn_light_list_add(list, dirs[part], irradiance);
+        gn_render_lights_add(list, dirs[part], irradiance);
 }
 
 /** Cells of the sphere that the map does not show; theta from the optical axis. */
@@ -90,7 +90,7 @@ static void add_fill(const struct gn_radiance_map *map, struct light_list *list)
             for (int k = 0; k < 3; k++)
                 irradiance[k] = map->fill[k] * cell[part] * scale;
             gn_pose_rotate(&map->world_from_probe, dir, dir);
-            gn_light_list_add(list, dir, irradiance);
+            gn_render_lights_add(list, dir, irradiance);
         }
         scale = sum > 0 ? map->fill_solid_angle / sum : 0;
     }
@@ -116,8 +116,8 @@ int gn_reference_make_lights(const struct gn_radiance_map *map, struct light_lis
     int height = map->radiance.height;
     bool has_fill =
         !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
-    int ret = gn_light_list_reserve(list, width * height + MAX_PARTS +
-                                              (has_fill ? 2 * FILL_RINGS * FILL_SECTORS : 0));
+    int ret = gn_render_lights_reserve(list, width * height + MAX_PARTS +
+                                                 (has_fill ? 2 * FILL_RINGS * FILL_SECTORS : 0));
     if (ret < 0)
         return ret;
     double total[3] = {0};

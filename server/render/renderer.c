@@ -64,7 +64,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     for (int i = 0; i < self->n_workers && self->scratches; i++)
         free(self->scratches[i].texel_blocked);
     free(self->scratches);
-    gn_light_list_finish(&self->lights);
+    gn_render_lights_finish(&self->lights);
     free(self->rays);
     free(self->features);
     free(self->figures);
@@ -451,7 +451,7 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     if (ret == 0)
         ret = quality == GN_QUALITY_REFERENCE
                   ? gn_reference_make_lights(light->map, &renderer->lights)
-                  : gn_light_list_from_state(light, &renderer->lights);
+                  : gn_render_lights_from_state(light, &renderer->lights);
     if (ret == 0 && quality == GN_QUALITY_REFERENCE)
         ret = reserve_texels(renderer);
     if (ret < 0)
