@@ -1,0 +1,93 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What can be read off a running room: plain values, copied out under a short lock, so that the
+ * status page never makes a frame wait.
+ */
+#ifndef GN_SERVER_ROOM_FIGURES_H
+#define GN_SERVER_ROOM_FIGURES_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/image.h"
+#include "proto/wire.h"
+
+/** Upper bounds in ms of the histogram's buckets; one more bucket holds what is longer. */
+#define GN_FIGURES_BUCKETS 12
+extern const double gn_figures_bounds_ms[GN_FIGURES_BUCKETS];
+
+/** Times of a room's frames. */
+struct gn_time_histogram {
+    uint64_t counts[GN_FIGURES_BUCKETS + 1];
+    uint64_t n;
+    double sum_ms;
+};
+
+/** A room's figures; counters run since it was opened. */
+struct gn_room_figures {
+    int n_viewers, n_probes, n_objects, n_real_triangles, n_virtual_triangles;
+    uint64_t frames_in, frames_out, frames_dropped;
+    uint64_t dropped_by_reason[GN_MSG_DROP_REASON_INTERNAL + 1]; // by enum gn_msg_drop_reason
+    uint64_t environment_in, environment_superseded, environment_refused;
+    bool has_environment_waiting;     // one is unread: nobody in the room needs light
+    struct gn_time_histogram latency; // from the last byte received to the answer posted
+    struct gn_time_histogram busy;    // the render thread's time
+    double latency_p50_ms, latency_p90_ms, latency_p99_ms; // last 100 results; 0: none yet
+    double busy_p50_ms;
+    double holdable_fps_room;   // frames/s at 640 x 480, all viewers together; 0: not measured
+    double holdable_fps_viewer; // each one's share
+    bool has_light;
+    uint64_t light_sequence, light_published;
+    int64_t light_capture_ns;
+    int n_lights;
+    double light_ms_map, light_ms_sh, light_ms_lights, light_ms_decode;
+    bool has_receipt;
+    int last_width, last_height;        // px, first view of the last result
+    struct gn_msg_receipt last_receipt; // what was left out of it, and why, among others
+};
+
+/** One session's figures. */
+struct gn_session_figures {
+    uint64_t id;
+    enum gn_msg_role role;
+    char name[64];
+    char peer[64];
+    int64_t since_ns;
+    uint64_t frames_in, frames_out, frames_dropped, environment_in;
+    double last_latency_ms; // 0: none yet
+};
+
+/** What the network side counts. */
+struct gn_transport_figures {
+    int connections; // open now
+    uint64_t accepted, refused_full, protocol_errors, timeouts, stalled;
+    uint64_t bytes_in, bytes_out;
+};
+
+/** A picture that outlives its frame. Immutable; shared (ref). */
+struct gn_snapshot {
+    atomic_int references;
+    uint64_t frame_id;
+    int64_t time_ns;
+    struct gn_image8 image;
+};
+/** NULL-safe; nulls *snapshot. */
+void gn_snapshot_unref(struct gn_snapshot **snapshot);
+
+/** Adds one time. */
+void gn_time_histogram_add(struct gn_time_histogram *histogram, double ms);
+
+/** The last times, for percentiles. */
+#define GN_WINDOW 100
+struct gn_time_window {
+    double ms[GN_WINDOW];
+    int n;    // how many are there
+    int next; // where the next goes
+};
+void gn_time_window_add(struct gn_time_window *window, double ms);
+/** The smallest time that share (0, 1] of the window's times do not exceed; 0 where it is empty. */
+double gn_time_window_get(const struct gn_time_window *window, double share);
+
+#endif

@@ -1,0 +1,333 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/room/frame.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/clock.h"
+#include "common/composite.h"
+#include "common/jpeg.h"
+#include "server/room/buf_pool.h"
+
+/** The buffers of one picture size. */
+struct frame_buffers {
+    int width, height; // 0: not used yet
+    uint64_t used;     // the frame that used it last
+    struct gn_layers layers;
+    struct gn_image8 background;
+    struct gn_image8 composite;
+};
+
+struct gn_frame_maker {
+    const struct gn_room_options *options;
+    struct gn_renderer *renderer;
+    struct gn_jpeg *jpeg;
+    struct gn_buf_pool *payloads;
+    uint64_t n_frames;
+    struct frame_buffers buffers[GN_FRAME_KEPT_SIZES];
+};
+
+static void finish_buffers(struct frame_buffers *b)
+{
+    gn_layers_finish(&b->layers);
+    gn_image8_finish(&b->background);
+    gn_image8_finish(&b->composite);
+    *b = (struct frame_buffers){0};
+}
+
+int gn_frame_maker_create(const struct gn_room_options *options, const struct gn_scene *scene,
+                          struct gn_frame_maker **out_maker, struct gn_error *out_error)
+{
+    *out_maker = NULL;
+    struct gn_frame_maker *m = calloc(1, sizeof(*m));
+    if (!m)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    m->options = options;
+    int rc = gn_renderer_create(scene, options->pool, &m->renderer, out_error);
+    if (rc < 0)
+        goto out;
+    rc = gn_jpeg_create(&m->jpeg);
+    if (rc == 0)
+        rc = gn_buf_pool_create(&m->payloads);
+    if (rc < 0) {
+        gn_error_set(out_error, rc, "out of memory");
+        goto out;
+    }
+    *out_maker = m;
+    return 0;
+out:
+    gn_frame_maker_destroy(&m);
+    return rc;
+}
+
+void gn_frame_maker_destroy(struct gn_frame_maker **maker)
+{
+    struct gn_frame_maker *m = *maker;
+    if (!m)
+        return;
+    for (int i = 0; i < GN_FRAME_KEPT_SIZES; i++)
+        finish_buffers(&m->buffers[i]);
+    gn_buf_pool_destroy(&m->payloads);
+    gn_jpeg_destroy(&m->jpeg);
+    gn_renderer_destroy(&m->renderer);
+    free(m);
+    *maker = NULL;
+}
+
+/** The buffers of that size; those that rested longest are given up for a new size. */
+static int get_buffers(struct gn_frame_maker *m, int width, int height,
+                       struct frame_buffers **out_buffers)
+{
+    struct frame_buffers *b = &m->buffers[0];
+    for (int i = 0; i < GN_FRAME_KEPT_SIZES; i++) {
+        struct frame_buffers *each = &m->buffers[i];
+        if (each->width == width && each->height == height) {
+            each->used = m->n_frames;
+            *out_buffers = each;
+            return 0;
+        }
+        if (each->used < b->used)
+            b = each;
+    }
+    finish_buffers(b);
+    int rc = gn_layers_init(&b->layers, width, height);
+    if (rc == 0)
+        rc = gn_image8_init(&b->background, width, height, 3);
+    if (rc == 0)
+        rc = gn_image8_init(&b->composite, width, height, 3);
+    if (rc < 0) {
+        finish_buffers(b);
+        return rc;
+    }
+    b->width = width;
+    b->height = height;
+    b->used = m->n_frames;
+    *out_buffers = b;
+    return 0;
+}
+
+/** Milliseconds since *at, which moves on to now. */
+static double lap(int64_t *at)
+{
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    double ms = (double)(now_ns - *at) * 1e-6;
+    *at = now_ns;
+    return ms;
+}
+
+/** The view's picture to b->background. Returns 0 or a reason and a sentence. */
+static enum gn_msg_drop_reason decode_picture(struct gn_frame_maker *m,
+                                              const struct gn_frame_job *job, size_t index,
+                                              struct frame_buffers *b, struct gn_error *error)
+{
+    const struct gn_msg_frame_view *view = &job->frame.views[index];
+    size_t n = (size_t)b->width * (size_t)b->height * 3;
+    switch (view->picture_format) {
+    case GN_MSG_PICTURE_FORMAT_NONE:
+        memset(b->background.data, 0, n);
+        return 0;
+    case GN_MSG_PICTURE_FORMAT_RGB8:
+        memcpy(b->background.data, job->payload->data + view->payload_offset, n);
+        return 0;
+    case GN_MSG_PICTURE_FORMAT_JPEG: {
+        struct gn_error why = {0};
+        int rc = gn_jpeg_decode(m->jpeg, job->payload->data + view->payload_offset,
+                                view->payload_length, &b->background, &why);
+        if (rc == 0)
+            return 0;
+        gn_error_set(error, rc, "view %zu: %s", index, why.text);
+        return rc == -ENOMEM ? GN_MSG_DROP_REASON_INTERNAL : GN_MSG_DROP_REASON_BAD_PICTURE;
+    }
+    default:
+        gn_error_set(error, 0, "view %zu: picture format %d is none", index,
+                     (int)view->picture_format);
+        return GN_MSG_DROP_REASON_BAD_FRAME;
+    }
+}
+
+/** Adds one view's report to the frame's receipt: times and rays are sums over the views. */
+static void add_report(struct gn_msg_receipt *receipt, const struct gn_render_report *report)
+{
+    receipt->plan_ms += (float)report->ms_plan;
+    receipt->primary_ms += (float)report->ms_primary;
+    receipt->shade_ms += (float)report->ms_shade;
+    receipt->shadow_ms += (float)report->ms_shadow;
+    receipt->rays_primary += report->rays_primary;
+    receipt->rays_shadow += report->rays_shadow + report->rays_shade;
+    receipt->rays_secondary += report->rays_mirror;
+    receipt->lights_used = (uint32_t)report->n_lights;
+    if ((float)report->estimated_error > receipt->estimated_error)
+        receipt->estimated_error = (float)report->estimated_error;
+    for (int i = 0; i < report->n_plan; i++) {
+        const struct gn_plan_entry *entry = &report->plan[i];
+        bool is_known = entry->ran;
+        for (size_t k = 0; k < receipt->left_out_count && !is_known; k++)
+            is_known = strcmp(receipt->left_out[k].pass, entry->pass) == 0 &&
+                       strncmp(receipt->left_out[k].why, entry->why,
+                               sizeof(receipt->left_out[k].why) - 1) == 0;
+        if (is_known || receipt->left_out_count == GN_ARRAY_LEN(receipt->left_out))
+            continue;
+        struct gn_msg_left_out *out = &receipt->left_out[receipt->left_out_count++];
+        gn_wire_set_string(out->pass, sizeof(out->pass), entry->pass);
+        gn_wire_set_string(out->why, sizeof(out->why), entry->why);
+    }
+}
+
+/** Everything of one frame that its steps share. */
+struct work {
+    struct gn_frame_maker *maker;
+    struct gn_frame_job *job;
+    const struct gn_lighting_state *light;
+    struct gn_msg_result *result;      // being filled, in the job's answer's place
+    struct gn_buf *payload;            // being filled
+    size_t used;                       // bytes of it
+    const struct gn_image8 *composite; // of the view made last
+};
+
+/** Renders a view and puts it over b->background, into b->composite. */
+static int draw_view(struct work *w, size_t index, struct frame_buffers *b, struct gn_error *error)
+{
+    struct gn_frame_maker *m = w->maker;
+    const struct gn_camera *camera = &w->job->cameras[index];
+    struct gn_render_options options = m->options->render;
+    options.quality = (enum gn_quality)w->job->frame.quality;
+    options.seed = w->job->frame.id;
+    struct gn_render_report report = {0};
+    int rc =
+        gn_renderer_render(m->renderer, camera, w->light, &options, &b->layers, &report, error);
+    if (rc < 0)
+        return rc;
+    add_report(&w->result->receipt, &report);
+    const struct gn_composite_layers layers = {&b->layers.virtual_rgba, &b->layers.shadow,
+                                               &b->layers.added};
+    bool is_literal = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED;
+    int64_t at = gn_clock_get_monotonic_ns();
+    rc = gn_composite_srgb8(&layers, &b->background, &camera->response, is_literal,
+                            m->options->pool, &b->composite);
+    w->result->receipt.composite_ms += (float)lap(&at);
+    return rc < 0 ? gn_error_set(error, rc, "the layers do not fit the picture") : 0;
+}
+
+/** One view from picture to its place in the payload. */
+static enum gn_msg_drop_reason make_view(struct work *w, size_t index, struct gn_error *error)
+{
+    struct gn_frame_maker *m = w->maker;
+    const struct gn_camera *camera = &w->job->cameras[index];
+    struct frame_buffers *b;
+    if (get_buffers(m, camera->width, camera->height, &b) < 0) {
+        gn_error_set(error, -ENOMEM, "out of memory for %dx%d", camera->width, camera->height);
+        return GN_MSG_DROP_REASON_INTERNAL;
+    }
+    int64_t at = gn_clock_get_monotonic_ns();
+    enum gn_msg_drop_reason reason = decode_picture(m, w->job, index, b, error);
+    w->result->receipt.decode_ms += (float)lap(&at);
+    if (reason != 0)
+        return reason;
+
+    if (draw_view(w, index, b, error) < 0)
+        return GN_MSG_DROP_REASON_INTERNAL;
+
+    uint8_t *out = w->payload->data + w->used;
+    size_t room = w->payload->len - w->used, n = 0;
+    bool is_jpeg = w->job->frame.result_format == GN_MSG_PICTURE_FORMAT_JPEG;
+    at = gn_clock_get_monotonic_ns();
+    if (is_jpeg) {
+        const struct gn_jpeg_options options = {.quality = (int)w->job->frame.jpeg_quality};
+        if (gn_jpeg_encode(m->jpeg, &b->composite, &options, out, room, &n, error) < 0)
+            return GN_MSG_DROP_REASON_INTERNAL;
+    } else {
+        n = (size_t)b->width * (size_t)b->height * 3;
+        assert(n <= room);
+        memcpy(out, b->composite.data, n);
+    }
+    w->result->receipt.encode_ms += (float)lap(&at);
+    w->result->views[index] = (struct gn_msg_result_view){
+        .format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
+        .width = (uint32_t)b->width,
+        .height = (uint32_t)b->height,
+        .payload_offset = (uint32_t)w->used,
+        .payload_length = (uint32_t)n,
+    };
+    w->used += n;
+    w->composite = &b->composite;
+    return 0;
+}
+
+/** Most bytes that the result's pictures can take. */
+static size_t get_payload_bound(const struct gn_frame_job *job)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < job->frame.views_count; i++) {
+        const struct gn_camera *c = &job->cameras[i];
+        n += job->frame.result_format == GN_MSG_PICTURE_FORMAT_JPEG
+                 ? gn_jpeg_get_bound(c->width, c->height)
+                 : (size_t)c->width * (size_t)c->height * 3;
+    }
+    return n;
+}
+
+static enum gn_msg_drop_reason make_views(struct work *w, struct gn_error *error)
+{
+    for (size_t i = 0; i < w->job->frame.views_count; i++) {
+        enum gn_msg_drop_reason reason = make_view(w, i, error);
+        if (reason != 0)
+            return reason;
+    }
+    if (w->used > GN_LIMIT_RESULT_BYTES) {
+        gn_error_set(error, 0, "the result has %zu bytes, a message holds %u: lower jpeg_quality",
+                     w->used, GN_LIMIT_RESULT_BYTES);
+        return GN_MSG_DROP_REASON_UNSUPPORTED;
+    }
+    w->payload->len = w->used;
+    return 0;
+}
+
+static void start_receipt(struct gn_msg_receipt *receipt, const struct gn_frame_job *job,
+                          const struct gn_lighting_state *light, int64_t now_ns)
+{
+    receipt->queue_ms = (float)((double)(now_ns - job->received_ns) * 1e-6);
+    receipt->lighting_sequence = light->sequence;
+    receipt->lighting_age_ms =
+        (float)((double)(job->frame.capture_time_ns - light->capture_time_ns) * 1e-6);
+    receipt->estimated_error = -1;
+    receipt->quality = job->frame.quality;
+}
+
+void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
+                         const struct gn_lighting_state *light,
+                         struct gn_frame_outcome *out_outcome)
+{
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    *out_outcome = (struct gn_frame_outcome){0};
+    maker->n_frames++;
+    struct gn_note *answer = job->answer;
+    struct work w = {.maker = maker, .job = job, .light = light, .result = &answer->body.result};
+    if (gn_buf_pool_get(maker->payloads, get_payload_bound(job), &w.payload) < 0) {
+        out_outcome->reason = GN_MSG_DROP_REASON_INTERNAL;
+        gn_error_set(&out_outcome->error, -ENOMEM, "out of memory for the result");
+        return;
+    }
+    memset(&answer->body, 0, sizeof(answer->body));
+    start_receipt(&w.result->receipt, job, light, start_ns);
+    out_outcome->reason = make_views(&w, &out_outcome->error);
+    if (out_outcome->reason != 0) {
+        gn_buf_unref(&w.payload);
+        return;
+    }
+    w.result->id = job->frame.id;
+    w.result->capture_time_ns = job->frame.capture_time_ns;
+    w.result->views_count = job->frame.views_count;
+    w.result->has_receipt = true;
+    answer->type = GN_WIRE_RESULT;
+    answer->payload = w.payload;
+
+    double pixels = 0;
+    for (size_t i = 0; i < job->frame.views_count; i++)
+        pixels += (double)job->cameras[i].width * job->cameras[i].height;
+    out_outcome->busy_ms = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
+    out_outcome->vga_ms = out_outcome->busy_ms * (640.0 * 480.0 / pixels);
+    out_outcome->composite = w.composite;
+}

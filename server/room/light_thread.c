@@ -1,0 +1,169 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* The light thread: newest environment frame to published lighting state. */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/log.h"
+#include "server/room/convert.h"
+#include "server/room/environment.h"
+#include "server/room/lighting_message.h"
+#include "server/room/room_internal.h"
+
+GN_LOG_TOPIC("room");
+
+/** Nobody needs light: a frame may rest in its slot until somebody comes. */
+static bool is_light_wanted_locked(const struct gn_room *room)
+{
+    return room->n_viewers > 0 || room->n_subscribers > 0 ||
+           (room->light_asked_ns > 0 &&
+            gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS);
+}
+
+/** Waits for a frame that is wanted. False: the room stops. */
+static bool wait_for_frame(struct gn_room *room, struct gn_environment_job *out_job)
+{
+    gn_mutex_lock(&room->mu);
+    while (!room->is_stopping && !(room->has_environment && is_light_wanted_locked(room)))
+        gn_cond_wait(&room->light_wake, &room->mu);
+    bool is_there = !room->is_stopping;
+    if (is_there) {
+        *out_job = room->environment;
+        room->has_environment = false;
+    }
+    gn_mutex_unlock(&room->mu);
+    return is_there;
+}
+
+/** Tells the probe what is wrong with its frame. */
+static void refuse(struct gn_room *room, const struct gn_environment_job *job, int code,
+                   const char *sentence)
+{
+    gn_mutex_lock(&room->mu);
+    room->figures.environment_refused++;
+    gn_mutex_unlock(&room->mu);
+    gn_log(GN_LOG_DEBUG, "room %s: session %llu: environment frame %llu refused: %s", room->name,
+           (unsigned long long)job->session_id, (unsigned long long)job->frame.sequence, sentence);
+    struct gn_note *note;
+    if (gn_mailbox_get_blank(room->options.mailbox, &note) < 0)
+        return;
+    note->session_id = job->session_id;
+    gn_note_set_error(note,
+                      code == -ENOMEM ? GN_MSG_ERROR_CODE_INTERNAL : GN_MSG_ERROR_CODE_BAD_VALUE,
+                      GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, sentence);
+    gn_mailbox_post(room->options.mailbox, note);
+}
+
+/** Who wants the state, and whether any wants its map. */
+struct subscribers {
+    uint64_t ids[GN_ROOM_MAX_SUBSCRIBERS];
+    bool want_map[GN_ROOM_MAX_SUBSCRIBERS];
+    int n;
+    bool any_map, any_plain;
+};
+
+static void list_subscribers_locked(const struct gn_room *room, struct subscribers *out)
+{
+    memset(out, 0, sizeof(*out));
+    for (const struct gn_room_session *s = room->sessions; s; s = s->next) {
+        if (!s->want_lighting_states || out->n == GN_ROOM_MAX_SUBSCRIBERS)
+            continue;
+        out->ids[out->n] = s->id;
+        out->want_map[out->n++] = s->want_lighting_maps;
+        out->any_map = out->any_map || s->want_lighting_maps;
+        out->any_plain = out->any_plain || !s->want_lighting_maps;
+    }
+}
+
+static void tell_subscribers(struct gn_room *room, const struct gn_lighting_state *state,
+                             const struct subscribers *subscribers)
+{
+    struct gn_msg_lighting_state bodies[2] = {0}; // without and with the map
+    struct gn_buf *payloads[2] = {0};
+    int rc = 0;
+    if (subscribers->any_plain)
+        rc = gn_lighting_message_make(state, false, room->options.pool, &bodies[0], &payloads[0]);
+    if (rc == 0 && subscribers->any_map)
+        rc = gn_lighting_message_make(state, true, room->options.pool, &bodies[1], &payloads[1]);
+    for (int i = 0; rc == 0 && i < subscribers->n; i++) {
+        struct gn_note *note;
+        rc = gn_mailbox_get_blank(room->options.mailbox, &note);
+        if (rc < 0)
+            break;
+        int which = subscribers->want_map[i];
+        note->session_id = subscribers->ids[i];
+        note->type = GN_WIRE_LIGHTING_STATE;
+        note->body.lighting_state = bodies[which];
+        gn_wire_set_string(note->body.lighting_state.room, sizeof(bodies[0].room), room->name);
+        gn_wire_set_string(note->body.lighting_state.node, sizeof(bodies[0].node), room->node);
+        note->payload = gn_buf_ref(payloads[which]);
+        gn_mailbox_post(room->options.mailbox, note);
+    }
+    if (rc < 0)
+        gn_log(GN_LOG_WARN, "room %s: lighting state %llu not sent: %s", room->name,
+               (unsigned long long)state->sequence, strerror(-rc));
+    gn_buf_unref(&payloads[0]);
+    gn_buf_unref(&payloads[1]);
+}
+
+/** Makes the state the room's; takes the reference. */
+static void publish(struct gn_room *room, struct gn_lighting_state *state, double ms_decode)
+{
+    struct subscribers subscribers;
+    struct gn_lighting_state *mine = gn_lighting_state_ref(state);
+    gn_mutex_lock(&room->mu);
+    struct gn_lighting_state *old = room->light;
+    room->light = state;
+    struct gn_room_figures *f = &room->figures;
+    f->has_light = true;
+    f->light_published++;
+    f->light_sequence = mine->sequence;
+    f->light_capture_ns = mine->capture_time_ns;
+    f->n_lights = mine->n_lights;
+    f->light_ms_decode = ms_decode;
+    f->light_ms_map = mine->ms_map;
+    f->light_ms_sh = mine->ms_sh;
+    f->light_ms_lights = mine->ms_lights;
+    list_subscribers_locked(room, &subscribers);
+    gn_cond_signal(&room->render_wake);
+    gn_mutex_unlock(&room->mu);
+    gn_lighting_state_unref(&old);
+    if (subscribers.n > 0)
+        tell_subscribers(room, mine, &subscribers);
+    gn_lighting_state_unref(&mine);
+}
+
+void gn_room_run_light(void *context)
+{
+    struct gn_room *room = context;
+    struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
+    struct gn_lighting_state *previous = NULL; // whose tables the next of the stream uses again
+    struct gn_environment_job job;
+    while (wait_for_frame(room, &job)) {
+        struct gn_error error = {0};
+        struct gn_environment_frame frame;
+        struct gn_lighting_state *state = NULL;
+        int64_t start_ns = gn_clock_get_monotonic_ns();
+        int rc = decoder ? gn_environment_decode(decoder, &job.frame, job.payload, &frame, &error)
+                         : gn_error_set(&error, -ENOMEM, "out of memory");
+        double ms_decode = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
+        struct gn_light_options options = room->options.light;
+        options.previous = previous;
+        if (rc == 0)
+            rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
+                                          &state, &error);
+        if (rc < 0) {
+            refuse(room, &job, rc, error.text);
+        } else {
+            gn_lighting_state_unref(&previous);
+            previous = gn_lighting_state_ref(state);
+            publish(room, state, ms_decode);
+        }
+        gn_buf_unref(&job.payload);
+    }
+    gn_lighting_state_unref(&previous);
+    if (decoder)
+        gn_environment_decoder_finish(decoder);
+    free(decoder);
+}

@@ -1,0 +1,123 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * A room: one scene, one lighting state, the sessions that share them. Its light thread makes
+ * lighting states from the newest environment frame, its render thread makes results from the
+ * viewers' newest frames, in turn. Knows messages, but no sockets: answers leave by a mailbox.
+ */
+#ifndef GN_SERVER_ROOM_ROOM_H
+#define GN_SERVER_ROOM_ROOM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/pool.h"
+#include "proto/attr.h"
+#include "server/light/state.h"
+#include "server/render/render.h"
+#include "server/room/figures.h"
+#include "server/room/mailbox.h"
+
+/** Most rooms of one server. */
+#define GN_ROOMS_MAX 16
+
+/** What a room is made from. Copied. */
+struct gn_room_options {
+    const char *name;                          // [1, 63] bytes
+    const char *node;                          // the server's name, for LIGHTING_STATE
+    const char *scene_path;                    // of scene.json
+    struct gn_light_options light;             // all-zero: defaults
+    struct gn_radiance_map_options map;        // all-zero: defaults
+    struct gn_render_options render;           // quality and seed are each frame's own
+    bool encoded_multiply;                     // the paper's composite: the factor scales codes
+    bool refuse_reference;                     // frames of reference quality are dropped
+    int max_picture_width, max_picture_height; // px, [1, GN_LIMIT_SIDE_PX]
+    int max_environment_width, max_environment_height; // px, [1, GN_LIMIT_SIDE_PX]
+    double holdable_margin;     // share of the measured rate that is promised, (0, 1]
+    struct gn_pool *pool;       // borrowed until destroy; may be NULL
+    struct gn_mailbox *mailbox; // borrowed until destroy
+};
+
+/** Thread-safety: gn_room_join() to gn_room_put_...(): one thread; the rest: safe. */
+struct gn_room;
+/** One session's place in a room. Owner thread: the one that joined. */
+struct gn_room_session;
+
+/** How a session takes part. */
+struct gn_room_member {
+    uint64_t id;           // > 0, never used again
+    enum gn_msg_role role; // PROBE or VIEWER
+    const char *name;      // of the client; copied
+    const char *peer;      // its address; copied
+    bool want_lighting_states;
+    bool want_lighting_maps;
+    bool want_statistics; // only counted here: gn_room_get_statistics() makes them
+};
+
+/** Reads the scene and starts both threads. Returns 0 or a negative errno and a sentence. */
+GN_MUST_USE int gn_room_create(const struct gn_room_options *options, struct gn_room **out_room,
+                               struct gn_error *out_error);
+/** Waits for the frame that is being rendered. All sessions must have left. NULL-safe; nulls. */
+void gn_room_destroy(struct gn_room **room);
+
+/** Borrowed until destroy; immutable. */
+const struct gn_room_options *gn_room_get_options(const struct gn_room *room);
+
+/** Lets a session in. Returns 0, -EUSERS (full) or -ENOMEM, and a sentence. */
+GN_MUST_USE int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
+                             struct gn_room_session **out_session, struct gn_error *out_error);
+/** Its unread frame is forgotten; what is being rendered is posted and finds nobody. Nulls. */
+void gn_room_leave(struct gn_room_session **session);
+
+/**
+ * The newest environment frame replaces an unread one. Decoding is left to the light thread, which
+ * posts an ERROR where the pixels are bad. payload: the caller's reference stays the caller's.
+ * Returns 0, or -EINVAL and a sentence (sizes that do not fit, not built), -EDOM (sequence not
+ * rising), -ENOMEM.
+ */
+GN_MUST_USE int gn_room_put_environment(struct gn_room_session *session,
+                                        const struct gn_msg_environment_frame *frame,
+                                        struct gn_buf *payload, struct gn_error *out_error);
+
+/** Sets a camera of the session. Returns 0, or -EINVAL and a sentence. */
+GN_MUST_USE int gn_room_put_camera(struct gn_room_session *session,
+                                   const struct gn_msg_camera *camera, struct gn_error *out_error);
+
+/** Sets the pose that views without their own use. Returns 0, or -EINVAL and a sentence. */
+GN_MUST_USE int gn_room_put_pose(struct gn_room_session *session, const struct gn_msg_pose *pose,
+                                 struct gn_error *out_error);
+
+/**
+ * Takes a frame: from success on it is answered exactly once, by a RESULT or a DROPPED in the
+ * mailbox. It replaces the session's unread frame, which is answered DROPPED (superseded).
+ * Returns 0, -EDOM and a sentence (id not rising: the session cannot go on), -ENOMEM.
+ */
+GN_MUST_USE int gn_room_put_frame(struct gn_room_session *session, const struct gn_msg_frame *frame,
+                                  struct gn_buf *payload, int64_t received_ns,
+                                  struct gn_error *out_error);
+
+/** Frames/s at 640 x 480 that each viewer can count on; 0: not measured yet. */
+double gn_room_get_holdable_fps(struct gn_room *room);
+/** The same as the room's viewers would have with one more of them. */
+double gn_room_get_holdable_fps_with(struct gn_room *room, int more_viewers);
+
+/** STATISTICS of this moment. */
+void gn_room_get_statistics(struct gn_room *room, struct gn_msg_statistics *out_statistics);
+
+/** All figures of this moment. */
+void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figures);
+/** Up to cap sessions' figures; returns how many. */
+int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_sessions, int cap);
+
+/** The published lighting state, a reference for the caller; NULL: none yet. */
+struct gn_lighting_state *gn_room_get_light(struct gn_room *room);
+
+/**
+ * The last composite, RGB in its camera's response. The room keeps one only while somebody asks:
+ * the first call gives NULL and makes the room keep the next. Copied by the render thread, so a
+ * reader never holds a frame up. The reference is the caller's.
+ */
+struct gn_snapshot *gn_room_get_composite(struct gn_room *room);
+
+#endif
