@@ -1,0 +1,220 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* /api/v1/status and /readyz. */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include "common/clock.h"
+#include "server/http/http_internal.h"
+
+static double get_ms_since(int64_t then_ns)
+{
+    return (double)(gn_clock_get_monotonic_ns() - then_ns) * 1e-6;
+}
+
+/** json_object_set_new() fails where value is NULL: out of memory is found once, at the end. */
+static void put(json_t *object, const char *key, json_t *value, bool *is_short)
+{
+    if (json_object_set_new(object, key, value) < 0)
+        *is_short = true;
+}
+
+static void append(json_t *array, json_t *value, bool *is_short)
+{
+    if (json_array_append_new(array, value) < 0)
+        *is_short = true;
+}
+
+static const char *get_role_name(enum gn_msg_role role)
+{
+    return role == GN_MSG_ROLE_PROBE ? "probe" : "viewer";
+}
+
+static json_t *make_sessions(struct gn_room *room, bool *is_short)
+{
+    struct gn_session_figures *sessions = calloc(GN_HTTP_MAX_SESSIONS, sizeof(*sessions));
+    json_t *list = json_array();
+    if (!sessions || !list)
+        *is_short = true;
+    int n = sessions ? gn_room_get_sessions(room, sessions, GN_HTTP_MAX_SESSIONS) : 0;
+    for (int i = 0; i < n; i++) {
+        const struct gn_session_figures *s = &sessions[i];
+        append(list,
+               json_pack("{s:I, s:s, s:s, s:s, s:f, s:I, s:I, s:I, s:I, s:f}", //
+                         "id", (json_int_t)s->id, "role", get_role_name(s->role), "name", s->name,
+                         "peer", s->peer, "age_s", get_ms_since(s->since_ns) * 1e-3, //
+                         "frames_in", (json_int_t)s->frames_in, "frames_out",
+                         (json_int_t)s->frames_out, "frames_dropped", (json_int_t)s->frames_dropped,
+                         "environment_frames_in", (json_int_t)s->environment_in, "last_latency_ms",
+                         s->last_latency_ms),
+               is_short);
+    }
+    free(sessions);
+    return list;
+}
+
+static json_t *make_light(const struct gn_room_figures *f)
+{
+    if (!f->has_light)
+        return json_pack("{s:b, s:b}", "lit", 0, "environment_frame_waiting",
+                         f->has_environment_waiting);
+    return json_pack("{s:b, s:b, s:I, s:f, s:i, s:I, s:{s:f, s:f, s:f, s:f}}", //
+                     "lit", 1, "environment_frame_waiting", f->has_environment_waiting, "sequence",
+                     (json_int_t)f->light_sequence, "age_ms", get_ms_since(f->light_capture_ns),
+                     "lights", f->n_lights, "published",
+                     (json_int_t)f->light_published, //
+                     "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh",
+                     f->light_ms_sh, "lights", f->light_ms_lights);
+}
+
+static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
+{
+    const struct gn_msg_receipt *r = &f->last_receipt;
+    static const char *const qualities[] = {"interactive", "seed", "reference"};
+    if (!f->has_receipt)
+        return json_null();
+    json_t *left_out = json_array();
+    for (size_t i = 0; i < r->left_out_count; i++)
+        append(left_out,
+               json_pack("{s:s, s:s}", "pass", r->left_out[i].pass, "why", r->left_out[i].why),
+               is_short);
+    // clang-format off
+    return json_pack(
+        "{s:i, s:i, s:s, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f},"
+        " s:I, s:f, s:I, s:{s:I, s:I, s:I}, s:f, s:o}",
+        "width", f->last_width, "height", f->last_height,
+        "quality", (unsigned)r->quality < 3 ? qualities[r->quality] : "?",
+        "ms", "queue", r->queue_ms, "decode", r->decode_ms, "plan", r->plan_ms,
+            "primary", r->primary_ms, "shade", r->shade_ms, "shadow", r->shadow_ms,
+            "composite", r->composite_ms, "encode", r->encode_ms,
+        "lighting_sequence", (json_int_t)r->lighting_sequence,
+        "lighting_age_ms", r->lighting_age_ms,
+        "lights_used", (json_int_t)r->lights_used,
+        "rays", "primary", (json_int_t)r->rays_primary, "shadow", (json_int_t)r->rays_shadow,
+            "secondary", (json_int_t)r->rays_secondary,
+        "estimated_error", r->estimated_error, "left_out", left_out);
+    // clang-format on
+}
+
+static json_t *make_dropped(const struct gn_room_figures *f, bool *is_short)
+{
+    json_t *list = json_array();
+    for (int i = 0; i <= GN_MSG_DROP_REASON_INTERNAL; i++) {
+        if (f->dropped_by_reason[i])
+            append(list,
+                   json_pack("{s:i, s:s, s:I}", "reason", i, "text",
+                             gn_wire_get_drop_text((enum gn_msg_drop_reason)i), "count",
+                             (json_int_t)f->dropped_by_reason[i]),
+                   is_short);
+    }
+    return list;
+}
+
+static json_t *make_room(struct gn_room *room, bool *is_short)
+{
+    struct gn_room_figures *f = calloc(1, sizeof(*f));
+    if (!f)
+        return NULL;
+    gn_room_get_figures(room, f);
+    // clang-format off
+    json_t *json = json_pack(
+        "{s:s, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I, s:I, s:o, s:I, s:I, s:I,"
+        " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o}",
+        "name", gn_room_get_options(room)->name,
+        "scene", "objects", f->n_objects, "real_triangles", f->n_real_triangles,
+            "virtual_triangles", f->n_virtual_triangles,
+        "viewers", f->n_viewers, "probes", f->n_probes,
+        "frames_in", (json_int_t)f->frames_in, "frames_out", (json_int_t)f->frames_out,
+        "frames_dropped", (json_int_t)f->frames_dropped, "dropped", make_dropped(f, is_short),
+        "environment_frames_in", (json_int_t)f->environment_in,
+        "environment_frames_superseded", (json_int_t)f->environment_superseded,
+        "environment_frames_refused", (json_int_t)f->environment_refused,
+        "latency_ms", "p50", f->latency_p50_ms, "p90", f->latency_p90_ms, "p99", f->latency_p99_ms,
+        "busy_p50_ms", f->busy_p50_ms,
+        "holdable_fps_640x480", "room", f->holdable_fps_room, "viewer", f->holdable_fps_viewer,
+        "light", make_light(f), "last_receipt", make_receipt(f, is_short),
+        "sessions", make_sessions(room, is_short));
+    // clang-format on
+    free(f);
+    return json;
+}
+
+struct config_list {
+    json_t *list;
+    bool *is_short;
+};
+
+static void add_value(void *context, const char *section, const char *name, const char *key,
+                      const char *value, const char *source)
+{
+    struct config_list *c = context;
+    append(c->list,
+           json_pack("{s:s?, s:s?, s:s, s:s, s:s}", "section", section, "name", name, "key", key,
+                     "value", value, "source", source),
+           c->is_short);
+}
+
+static json_t *make_transport(const struct gn_http_view *view)
+{
+    struct gn_transport_figures t = {0};
+    view->options.get_transport(view->options.transport_context, &t);
+    return json_pack("{s:i, s:I, s:I, s:I, s:I, s:I, s:I, s:I}", //
+                     "connections", t.connections, "accepted", (json_int_t)t.accepted,
+                     "refused_full", (json_int_t)t.refused_full, "protocol_errors",
+                     (json_int_t)t.protocol_errors, "timeouts", (json_int_t)t.timeouts, "stalled",
+                     (json_int_t)t.stalled, "bytes_in", (json_int_t)t.bytes_in, "bytes_out",
+                     (json_int_t)t.bytes_out);
+}
+
+/** Prints and frees json. */
+static int finish(json_t *json, bool is_short, struct gn_document *out)
+{
+    char *text =
+        json && !is_short ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(7)) : NULL;
+    json_decref(json);
+    if (!text)
+        return -ENOMEM;
+    *out = (struct gn_document){text, strlen(text), "application/json"};
+    return 0;
+}
+
+int gn_http_make_status(const struct gn_http_view *view, struct gn_document *out)
+{
+    bool is_short = false;
+    json_t *json = json_object(), *rooms = json_array(), *values = json_array();
+    for (int i = 0; i < view->options.n_rooms; i++)
+        append(rooms, make_room(view->options.rooms[i], &is_short), &is_short);
+    struct config_list list = {values, &is_short};
+    gn_options_visit(view->options.config, add_value, &list);
+    put(json, "name", json_string(view->options.server_name), &is_short);
+    put(json, "version", json_string(GN_VERSION), &is_short);
+    put(json, "protocol",
+        json_pack("{s:i, s:i}", "min", GN_PROTO_VERSION_MIN, "max", GN_PROTO_VERSION_MAX),
+        &is_short);
+    put(json, "uptime_s", json_real(get_ms_since(view->start_ns) * 1e-3), &is_short);
+    put(json, "network", make_transport(view), &is_short);
+    put(json, "rooms", rooms, &is_short);
+    put(json, "configuration", values, &is_short);
+    return finish(json, is_short, out);
+}
+
+int gn_http_make_ready(const struct gn_http_view *view, bool *out_is_ready, struct gn_document *out)
+{
+    bool is_short = false, is_ready = view->options.n_rooms > 0;
+    json_t *rooms = json_array();
+    for (int i = 0; i < view->options.n_rooms; i++) {
+        struct gn_room_figures f;
+        gn_room_get_figures(view->options.rooms[i], &f);
+        // A room exists only with its scene committed and its threads running.
+        append(rooms,
+               json_pack("{s:s, s:b, s:i, s:b}", "name",
+                         gn_room_get_options(view->options.rooms[i])->name, "scene", 1, "triangles",
+                         f.n_real_triangles + f.n_virtual_triangles, "lit", f.has_light),
+               &is_short);
+    }
+    *out_is_ready = is_ready;
+    return finish(json_pack("{s:b, s:o}", "ready", is_ready, "rooms", rooms), is_short, out);
+}
