@@ -1,0 +1,90 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/config.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+/** The path as the server opens it. */
+static int get_scene_path(const struct gn_options *o, const char *room, char out[static 4096],
+                          struct gn_error *error)
+{
+    const char *path = gn_options_get_string(o, "room", room, "scene");
+    const char *config = gn_options_get_string(o, NULL, NULL, "config");
+    const char *slash = config ? strrchr(config, '/') : NULL;
+    bool is_from_file =
+        strcmp(gn_options_get_source(o, "room", room, "scene"), "command line") != 0;
+    int n = slash && is_from_file && path[0] != '/'
+                ? snprintf(out, 4096, "%.*s/%s", (int)(slash - config), config, path)
+                : snprintf(out, 4096, "%s", path);
+    if (n >= 4096)
+        return gn_error_set(error, -ENAMETOOLONG, "room %s: the scene's path is too long", room);
+    return 0;
+}
+
+static void get_light(const struct gn_options *o, const char *room, struct gn_light_options *out)
+{
+    static const enum gn_light_method methods[] = {GN_LIGHT_PARTITION_ENERGY,
+                                                   GN_LIGHT_PARTITION_SEED, GN_LIGHT_PENROSE};
+    static const enum gn_partition_metric metrics[] = {GN_METRIC_DEFAULT, GN_METRIC_POW2,
+                                                       GN_METRIC_TWICE, GN_METRIC_LOG2};
+    *out = (struct gn_light_options){
+        .method = methods[gn_options_get_enum(o, "room", room, "light-method")],
+        .n_lights = gn_options_get_int(o, "room", room, "lights"),
+        .rings = gn_options_get_int(o, "room", room, "light-rings"),
+        .sectors = gn_options_get_int(o, "room", room, "light-sectors"),
+        .max_ls = gn_options_get_int(o, "room", room, "light-max-ls"),
+        .n_samples = gn_options_get_int(o, "room", room, "light-samples"),
+        .metric = metrics[gn_options_get_enum(o, "room", room, "light-metric")],
+    };
+}
+
+int gn_config_get_room(const struct gn_options *options, int i, char out_scene_path[static 4096],
+                       struct gn_room_options *out_room, struct gn_error *out_error)
+{
+    const struct gn_options *o = options;
+    const char *room = gn_options_get_name(o, "room", i);
+    if (strlen(room) > 63)
+        return gn_error_set(out_error, -EINVAL, "[room %s]: a name has at most 63 bytes", room);
+    int rc = get_scene_path(o, room, out_scene_path, out_error);
+    if (rc < 0)
+        return rc;
+    double albedo = gn_options_get_double(o, "room", room, "ground-albedo");
+    struct gn_room_options r = {
+        .name = room,
+        .node = gn_options_get_string(o, "server", NULL, "name"),
+        .scene_path = out_scene_path,
+        .map = {.ground_albedo = (float)albedo, .no_fill = albedo == 0},
+        .render =
+            {
+                .shading = gn_options_get_enum(o, "room", room, "shading") == 1
+                               ? GN_SHADING_IRRADIANCE_MAP
+                               : GN_SHADING_LIGHTS,
+                .no_shadow = !gn_options_get_bool(o, "room", room, "shadows"),
+                .shadow_unweighted = !gn_options_get_bool(o, "room", room, "shadow-cosine"),
+                .shadow_ignore_real = !gn_options_get_bool(o, "room", room, "shadow-real-blockers"),
+            },
+        .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
+        .refuse_reference = !gn_options_get_bool(o, "room", room, "allow-reference"),
+        .max_picture_width = gn_options_get_int(o, "room", room, "max-picture-width"),
+        .max_picture_height = gn_options_get_int(o, "room", room, "max-picture-height"),
+        .max_environment_width = gn_options_get_int(o, "room", room, "max-environment-width"),
+        .max_environment_height = gn_options_get_int(o, "room", room, "max-environment-height"),
+        .holdable_margin = gn_options_get_double(o, "room", room, "rate-margin"),
+    };
+    get_light(o, room, &r.light);
+    *out_room = r;
+    return 0;
+}
+
+void gn_config_get_net(const struct gn_options *options, struct gn_net_options *out_net)
+{
+    const struct gn_options *o = options;
+    out_net->address = gn_options_get_address(o, "server", NULL, "listen");
+    out_net->server_name = gn_options_get_string(o, "server", NULL, "name");
+    out_net->max_connections = gn_options_get_int(o, "server", NULL, "max-connections");
+    out_net->hello_timeout_ms = gn_options_get_int(o, "server", NULL, "hello-timeout-ms");
+    out_net->idle_timeout_ms = gn_options_get_int(o, "server", NULL, "idle-timeout-ms");
+    out_net->stall_timeout_ms = gn_options_get_int(o, "server", NULL, "stall-timeout-ms");
+}
