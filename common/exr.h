@@ -36,10 +36,10 @@ GN_MUST_USE int gn_exr_get_info(const void *data, size_t size, struct gn_exr_inf
  * Decodes R, G, B to [height][width][3], or Y alone to [height][width][1], of the data window of
  * the first part; scanlines or level 0 of tiles; half, float and uint samples. Values come as they
  * are: NaN, infinite and negative ones too. *out_saturated (may be NULL) says that half samples
- * reach 65504 or more, so that light may be missing. Sizes are checked against GN_IMAGE_MAX_* and
- * 4 GiB of decompressed samples before memory is taken. Returns 0, -EINVAL (damaged, too large, no
- * such channels), -ENOTSUP (deep; DWA or subsampled from memory), -ENOMEM, and a sentence.
- * Thread-safety: safe.
+ * reach 65504 or more (62016 in DWA, whose loss hides the limit), so that light may be missing.
+ * Sizes are checked against GN_IMAGE_MAX_* and 4 GiB of decompressed samples before memory is
+ * taken. Returns 0, -EINVAL (damaged, too large, no such channels), -ENOTSUP (deep; DWA or
+ * subsampled from memory), -ENOMEM, and a sentence. Thread-safety: safe.
  */
 GN_MUST_USE int gn_exr_read_memory(const void *data, size_t size, struct gn_image *out_image,
                                    bool *out_saturated, struct gn_error *out_error);

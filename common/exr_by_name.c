@@ -10,6 +10,12 @@
 
 #include "common/half.h"
 
+/*
+ * Where light may have been cut. DWA moves 65504 to 64704 .. 65248 at its default level 45, where
+ * 62016 is the largest value that surely survives (openexr #2606).
+ */
+#define SATURATED 62016.0f
+
 int gn_exr_read_by_name(const char *path, const struct gn_exr_info *info,
                         struct gn_image *out_image, bool *out_saturated, struct gn_error *out_error)
 {
@@ -42,7 +48,7 @@ int gn_exr_read_by_name(const char *path, const struct gn_exr_info *info,
             const ImfHalf rgb[3] = {row[x].r, row[x].g, row[x].b};
             for (int c = 0; c < info->channels; c++) {
                 float v = gn_half_to_float(rgb[c]);
-                saturated = saturated || fabsf(v) >= GN_HALF_MAX;
+                saturated = saturated || fabsf(v) >= SATURATED;
                 gn_image_at(&image, x, y)[c] = v;
             }
         }
