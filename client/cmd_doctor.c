@@ -1,0 +1,113 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * gnomon doctor: says what on this machine works.
+ */
+#include <glob.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <jansson.h>
+#include <openexr.h>
+#include <png.h>
+
+#include "client/cmd.h"
+#include "common/thread.h"
+#include "proto/attr.h"
+
+static const struct gn_option option_table[] = {
+    GN_CMD_CONNECT_OPTIONS,
+};
+
+static const struct gn_program program = {
+    .name = "gnomon doctor",
+    .usage = "[OPTION]...",
+    .summary = "Checks what a client needs: the server (reachable, version, clock), the cameras "
+               "this machine has, what this build can read. Exits 0 only when nothing failed.",
+    .notes = "Example:\n  gnomon doctor --server 127.0.0.1:7340\n",
+    .options = option_table,
+    .n_options = GN_ARRAY_LEN(option_table),
+};
+
+static void say(const char *mark, const char *what, const char *text)
+{
+    printf("%-6s %-10s %s\n", mark, what, text);
+}
+
+/** Connects, greets, measures the clock. Returns whether it worked. */
+static bool check_server(const struct gn_options *options)
+{
+    const char *server = gn_options_get_string(options, NULL, NULL, "server");
+    char text[512];
+    struct gn_client *client = NULL;
+    // A tracker: it needs no camera and costs the server nothing.
+    if (gn_cmd_connect(&program, options, GN_MSG_ROLE_TRACKER, &client) != 0) {
+        snprintf(text, sizeof(text), "%s does not serve us (the reason is above)", server);
+        say("FAILED", "server", text);
+        return false;
+    }
+    const struct gn_msg_welcome *w = gn_client_get_welcome(client);
+    snprintf(text, sizeof(text), "%s: %s %s, protocol %u, room '%s'", server, w->server_name,
+             w->server_version, w->version, w->room);
+    say("ok", "server", text);
+    snprintf(text, sizeof(text), "%.3f ms ahead of ours, round trip %.3f ms",
+             (double)gn_client_get_clock_offset_ns(client) * 1e-6,
+             (double)gn_client_get_round_trip_ns(client) * 1e-6);
+    say("ok", "clock", text);
+    snprintf(text, sizeof(text), "pictures up to %ux%u, environment frames up to %ux%u",
+             w->max_picture_width, w->max_picture_height, w->max_environment_width,
+             w->max_environment_height);
+    say("ok", "limits", text);
+    if (w->holdable_fps > 0)
+        snprintf(text, sizeof(text), "%.1f frames/s at 640x480 now", (double)w->holdable_fps);
+    else
+        snprintf(text, sizeof(text), "not measured yet: no frame has been rendered in this room");
+    say("ok", "rate", text);
+    gn_cmd_disconnect(&client);
+    return true;
+}
+
+static void check_libraries(void)
+{
+    int major = 0, minor = 0, patch = 0;
+    const char *extra = NULL;
+    char text[256];
+    exr_get_library_version(&major, &minor, &patch, &extra);
+    snprintf(text, sizeof(text), "OpenEXR %d.%d.%d, libpng %s, libjpeg-turbo, jansson %s", major,
+             minor, patch, png_get_libpng_ver(NULL), jansson_version_str());
+    say("ok", "libraries", text);
+}
+
+static void check_cameras(void)
+{
+    glob_t found = {0};
+    char text[512];
+    if (glob("/dev/video*", 0, NULL, &found) == 0 && found.gl_pathc > 0) {
+        snprintf(text, sizeof(text), "%zu device%s, the first %s; this build cannot read V4L2",
+                 found.gl_pathc, found.gl_pathc == 1 ? "" : "s", found.gl_pathv[0]);
+        say("no", "V4L2", text);
+    } else {
+        say("no", "V4L2", "no /dev/video* on this machine; this build cannot read V4L2");
+    }
+    globfree(&found);
+    say("no", "GigE", "this build cannot read GigE Vision cameras");
+    say("ok", "files", "EXR, Radiance, PNG, JPEG; sequences of the capture rig");
+}
+
+int gn_cmd_doctor(int argc, char *const argv[])
+{
+    struct gn_options *options = NULL;
+    int run = gn_cmd_load(&program, argc, argv, &options);
+    if (run <= 0)
+        return run ? 2 : 0;
+    gn_cmd_catch_signals();
+    char text[128];
+    snprintf(text, sizeof(text), "gnomon %s, protocol %d, %d processors", GN_VERSION,
+             GN_PROTO_VERSION_MAX, gn_thread_get_cpu_count());
+    say("ok", "client", text);
+    bool is_ok = check_server(options);
+    check_libraries();
+    check_cameras();
+    gn_options_destroy(&options);
+    return is_ok ? 0 : 1;
+}

@@ -1,0 +1,373 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * gnomon view: streams camera frames and poses from files, writes what comes back.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/capture/file.h"
+#include "client/capture/sequence.h"
+#include "client/cmd.h"
+#include "client/view/record.h"
+#include "common/clock.h"
+#include "proto/attr.h"
+
+/** Pictures per second where neither the files nor --rate say. */
+#define DEFAULT_RATE_HZ 10.0
+/** How long the last results are waited for. */
+#define LAST_RESULTS_NS (60 * GN_NS_PER_S)
+/** Most frames on their way at once. */
+#define MAX_OUTSTANDING 16
+
+static const struct gn_option option_table[] = {
+    GN_CMD_CONNECT_OPTIONS,
+    GN_CMD_REPLAY_OPTIONS,
+    {.key = "camera",
+     .flag = "camera",
+     .type = GN_OPTION_STRING,
+     .value_name = "FILE",
+     .help = "With --files: camera.json with intrinsics and the pose of a camera at rest "
+             "(docs/frames.md). A sequence brings its own."},
+    {.key = "out",
+     .flag = "out",
+     .type = GN_OPTION_STRING,
+     .value_name = "DIR",
+     .is_required = true,
+     .help = "Where the composited frames and view.json (every receipt) go."},
+    {.key = "result",
+     .flag = "result",
+     .type = GN_OPTION_ENUM,
+     .choices = "png|jpeg",
+     .default_value = "png",
+     .help = "What is asked of the server and written: png (lossless) or jpeg."},
+    {.key = "jpeg-quality",
+     .flag = "jpeg-quality",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 100,
+     .default_value = "90",
+     .help = "For --result jpeg."},
+    {.key = "quality",
+     .flag = "quality",
+     .type = GN_OPTION_ENUM,
+     .choices = "interactive|seed|reference",
+     .default_value = "interactive",
+     .help = "How the server renders: interactive; seed, the 2007 paper to the letter; reference, "
+             "every texel with exact visibility, slow."},
+    {.key = "outstanding",
+     .flag = "outstanding",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = MAX_OUTSTANDING,
+     .default_value = "1",
+     .help = "Frames that may be on their way at once. With 1 a frame waits for the result of the "
+             "one before; with more, frames that the server has not begun are replaced by newer "
+             "ones and come back as dropped."},
+    {.key = "sync-light",
+     .flag = "sync-light",
+     .type = GN_OPTION_DOUBLE,
+     .min = 1,
+     .max = 9e15,
+     .value_name = "N",
+     .help = "Have picture k wait for the light of environment frame N + k, k from 0, for at most "
+             "5 s: replays are then lit as they were recorded. See probe --first-sequence."},
+};
+
+static const struct gn_program program = {
+    .name = "gnomon view",
+    .usage = "--sequence DIR | --files PATTERN --camera FILE, --out DIR [OPTION]...",
+    .summary = "Streams camera frames and poses to a room and writes the composited frames that "
+               "come back, with their receipts. Every frame comes back exactly once, as a result "
+               "or as dropped with the reason.",
+    .notes = "Examples:\n"
+             "  gnomon view --sequence .cache/rig/lamps --out composites\n"
+             "  gnomon view --files 'shots/*.jpg' --camera camera.json --out composites\n",
+    .options = option_table,
+    .n_options = GN_ARRAY_LEN(option_table),
+};
+
+/** A frame that has been sent and not answered. id 0: free. */
+struct pending {
+    uint64_t id;
+    int64_t sent_ns;
+    char name[256];
+};
+
+/** One run of the command. */
+struct view {
+    struct gn_client *client;
+    struct gn_source *source;
+    struct gn_record *record;
+    struct gn_camera camera;
+    struct gn_msg_frame frame; // what all frames have in common
+    uint64_t sync_light;       // 0: not asked for
+    int max_outstanding;
+    int n_outstanding;
+    struct pending pending[MAX_OUTSTANDING];
+    long n_sent, n_results, n_dropped;
+    double latency_sum_ms, latency_max_ms;
+};
+
+static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
+                       struct view *v, struct gn_error *out_error)
+{
+    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
+    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
+    const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
+    if (!dir == !pattern || !pattern != !camera_path)
+        return gn_error_set(out_error, -EINVAL,
+                            "give --sequence DIR, or --files PATTERN with --camera FILE");
+    struct gn_sequence sequence = {0};
+    struct gn_file_list list = {0};
+    int err;
+    if (dir) {
+        err = gn_sequence_read(dir, &sequence, out_error);
+        v->camera = sequence.camera;
+        list = sequence.pictures;
+        memset(&sequence.pictures, 0, sizeof(sequence.pictures));
+    } else {
+        err = gn_camera_read_file(camera_path, &v->camera, out_error);
+        if (!err)
+            err = gn_file_list_find(pattern, pace->rate_hz, &list, out_error);
+        for (int i = 0; i < list.n_entries; i++) {
+            list.entries[i].has_pose = true;
+            list.entries[i].world_from_camera = v->camera.world_from_camera;
+        }
+    }
+    struct gn_file_source_options source_options = {.is_looped = pace->is_looped};
+    if (!err)
+        err = gn_file_source_open(&list, &source_options, &v->source);
+    gn_sequence_finish(&sequence);
+    gn_file_list_finish(&list);
+    return err;
+}
+
+static int send_camera(struct view *v)
+{
+    const struct gn_camera *c = &v->camera;
+    struct gn_msg_camera message = {
+        .width = (uint32_t)c->width,
+        .height = (uint32_t)c->height,
+        .fx = c->fx,
+        .fy = c->fy,
+        .cx = c->cx,
+        .cy = c->cy,
+        .k1 = c->distortion[0],
+        .k2 = c->distortion[1],
+        .p1 = c->distortion[2],
+        .p2 = c->distortion[3],
+        .k3 = c->distortion[4],
+        .has_response = true,
+        .scale = c->response.scale,
+    };
+    gn_cmd_make_response(&c->response, &message.response);
+    memcpy(message.matrix_to_rec709, c->response.to_rec709, sizeof(c->response.to_rec709));
+    return gn_client_send_camera(v->client, &message);
+}
+
+static struct pending *find_pending(struct view *v, uint64_t id)
+{
+    for (int i = 0; i < MAX_OUTSTANDING; i++) {
+        if (v->pending[i].id == id)
+            return &v->pending[i];
+    }
+    return NULL;
+}
+
+/** Takes what the server says about one frame. */
+static int take_answer(struct view *v, const struct gn_client_event *event,
+                       struct gn_error *out_error)
+{
+    bool is_result = event->type == GN_WIRE_RESULT;
+    uint64_t id = is_result ? event->message.result.id : event->message.dropped.id;
+    struct pending *p = id ? find_pending(v, id) : NULL;
+    if (!p)
+        return gn_error_set(out_error, -EPROTO, "frame %llu came back though it was not out",
+                            (unsigned long long)id);
+    int err;
+    if (is_result) {
+        double latency_ms = (double)(event->received_ns - p->sent_ns) * 1e-6;
+        const struct gn_msg_receipt *r = &event->message.result.receipt;
+        err = gn_record_add_result(v->record, p->name, &event->message.result, event->payload,
+                                   latency_ms, out_error);
+        v->n_results++;
+        v->latency_sum_ms += latency_ms;
+        v->latency_max_ms = fmax(v->latency_max_ms, latency_ms);
+        printf("frame %llu: %s, %.1f ms, %u lights, light %llu\n", (unsigned long long)id, p->name,
+               latency_ms, r->lights_used, (unsigned long long)r->lighting_sequence);
+    } else {
+        const struct gn_msg_dropped *d = &event->message.dropped;
+        err = gn_record_add_dropped(v->record, p->name, d);
+        v->n_dropped++;
+        printf("frame %llu: %s, dropped: %s\n", (unsigned long long)id, p->name,
+               d->sentence[0] ? d->sentence : gn_wire_get_drop_text(d->reason));
+    }
+    fflush(stdout);
+    p->id = 0;
+    v->n_outstanding--;
+    return err;
+}
+
+/**
+ * Takes events until due_ns, then until no more than max_left frames are out (but not beyond
+ * give_up_ns). 0, -EINTR (Ctrl-C), -ETIMEDOUT, or an error with its sentence.
+ */
+static int serve(struct view *v, int64_t due_ns, int max_left, int64_t give_up_ns,
+                 struct gn_error *out_error)
+{
+    for (;;) {
+        if (gn_cmd_is_interrupted())
+            return -EINTR;
+        int64_t now_ns = gn_clock_get_monotonic_ns(), left_ns = due_ns - now_ns;
+        if (left_ns <= 0 && now_ns > give_up_ns && v->n_outstanding > max_left)
+            return gn_error_set(out_error, -ETIMEDOUT, "%d frames never came back",
+                                v->n_outstanding);
+        int timeout_ms = left_ns <= 0 || left_ns > 200000000 ? 200 : (int)(left_ns / 1000000) + 1;
+        if (left_ns <= 0 && v->n_outstanding <= max_left)
+            timeout_ms = 0;
+        struct gn_client_event event;
+        int got = gn_client_poll(v->client, timeout_ms, &event);
+        int err = 0;
+        if (got < 0 && got != -EINTR)
+            return gn_error_set(out_error, got, "%s", gn_client_get_fault(v->client));
+        if (got > 0 && (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED))
+            err = take_answer(v, &event, out_error);
+        else if (got > 0 && event.type == GN_WIRE_ERROR)
+            err = gn_error_set(out_error, -EPROTO, "the server: %s", event.message.error.sentence);
+        else if (got > 0 && event.type == GN_WIRE_BYE)
+            err = gn_error_set(out_error, -ECONNRESET, "the server ended the session: %s",
+                               gn_wire_get_bye_text(event.message.bye.reason));
+        if (err)
+            return err;
+        if (timeout_ms == 0 && got == 0)
+            return 0;
+    }
+}
+
+static int send_frame(struct view *v, const struct gn_capture *capture, struct gn_error *out_error)
+{
+    if (capture->width != v->camera.width || capture->height != v->camera.height)
+        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
+                            capture->name, capture->width, capture->height, v->camera.width,
+                            v->camera.height);
+    bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
+    if (!is_jpeg && capture->format != GN_CAPTURE_RGB8)
+        return gn_error_set(out_error, -EINVAL,
+                            "%s is no 8-bit picture; camera frames are 8-bit PNG or JPEG",
+                            capture->name);
+    struct pending *p = find_pending(v, 0);
+    struct gn_msg_frame frame = v->frame;
+    frame.id = (uint64_t)v->n_sent + 1;
+    frame.capture_time_ns = gn_client_to_server_ns(v->client, gn_client_now_ns());
+    frame.views_count = 1;
+    frame.views[0] = (struct gn_msg_frame_view){
+        .has_world_from_camera = true,
+        .picture_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
+        .payload_length = (uint32_t)capture->data_bytes,
+    };
+    gn_cmd_make_transform(&capture->world_from_camera, &frame.views[0].world_from_camera);
+    if (v->sync_light) {
+        frame.lighting_min_sequence = v->sync_light + (uint64_t)v->n_sent;
+        frame.lighting_wait_ms = 5000;
+    }
+    *p = (struct pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
+    snprintf(p->name, sizeof(p->name), "%s", capture->name);
+    int err = gn_client_send_frame(v->client, &frame, capture->data, capture->data_bytes);
+    if (err)
+        return gn_error_set(out_error, err, "%s", gn_client_get_fault(v->client));
+    v->n_sent++;
+    v->n_outstanding++;
+    return 0;
+}
+
+static int stream(struct view *v, const struct gn_cmd_pace *pace, struct gn_error *out_error)
+{
+    int err = send_camera(v);
+    if (err)
+        return gn_error_set(out_error, err, "%s", gn_client_get_fault(v->client));
+    for (long n = 0; !pace->n_wanted || n < pace->n_wanted; n++) {
+        struct gn_capture capture;
+        int got = gn_source_read(v->source, &capture, out_error);
+        if (got < 0)
+            return got;
+        if (got == 0)
+            break;
+        int64_t due_ns = gn_cmd_pace_get_due_ns(pace, n, capture.time_s);
+        err = serve(v, due_ns, v->max_outstanding - 1, due_ns + LAST_RESULTS_NS, out_error);
+        if (!err)
+            err = send_frame(v, &capture, out_error);
+        if (err)
+            return err;
+    }
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    return serve(v, now_ns, 0, now_ns + LAST_RESULTS_NS, out_error);
+}
+
+static void set_frame_options(struct view *v, const struct gn_options *options)
+{
+    bool is_jpeg = gn_options_get_enum(options, NULL, NULL, "result") == 1;
+    v->frame.result_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8;
+    v->frame.jpeg_quality =
+        is_jpeg ? (uint32_t)gn_options_get_int(options, NULL, NULL, "jpeg-quality") : 0;
+    static const enum gn_msg_quality qualities[] = {GN_MSG_QUALITY_INTERACTIVE, GN_MSG_QUALITY_SEED,
+                                                    GN_MSG_QUALITY_REFERENCE};
+    v->frame.quality = qualities[gn_options_get_enum(options, NULL, NULL, "quality")];
+    v->max_outstanding = gn_options_get_int(options, NULL, NULL, "outstanding");
+    if (gn_options_is_set(options, NULL, NULL, "sync-light"))
+        v->sync_light = (uint64_t)gn_options_get_double(options, NULL, NULL, "sync-light");
+}
+
+/** Runs with everything open; the exit status. */
+static int run(struct view *v, const struct gn_cmd_pace *pace, const char *dir)
+{
+    struct gn_error error = {0};
+    int err = stream(v, pace, &error);
+    struct gn_error record_error = {0};
+    int record_err = gn_record_close(&v->record, &record_error);
+    if (err && err != -EINTR)
+        gn_cmd_fail(&program, error.text);
+    if (record_err)
+        gn_cmd_fail(&program, record_error.text);
+    printf("%ld frames sent, %ld results, %ld dropped", v->n_sent, v->n_results, v->n_dropped);
+    if (v->n_results)
+        printf("; %.1f ms from sending to result (mean), %.1f at most",
+               v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
+    printf("; in %s\n", dir);
+    return (err && err != -EINTR) || record_err ? 1 : 0;
+}
+
+int gn_cmd_view(int argc, char *const argv[])
+{
+    struct gn_options *options = NULL;
+    int go = gn_cmd_load(&program, argc, argv, &options);
+    if (go <= 0)
+        return go ? 2 : 0;
+    gn_cmd_catch_signals();
+    struct gn_error error = {0};
+    struct view v = {0};
+    struct gn_cmd_pace pace;
+    bool has_times = gn_options_is_set(options, NULL, NULL, "sequence");
+    gn_cmd_pace_init(&pace, options, has_times ? 0 : DEFAULT_RATE_HZ);
+    set_frame_options(&v, options);
+    const char *dir = gn_options_get_string(options, NULL, NULL, "out");
+    int status = 1;
+    int err = open_source(options, &pace, &v, &error);
+    if (!err)
+        err = gn_record_open(dir, &v.record, &error);
+    if (err)
+        gn_cmd_fail(&program, error.text);
+    else if (gn_cmd_connect(&program, options, GN_MSG_ROLE_VIEWER, &v.client) == 0)
+        status = run(&v, &pace, dir);
+    if (v.client)
+        gn_cmd_disconnect(&v.client);
+    // Still open only where there was no run: view.json of nothing says nothing.
+    if (v.record && gn_record_close(&v.record, &error))
+        gn_cmd_fail(&program, error.text);
+    gn_source_close(&v.source);
+    gn_options_destroy(&options);
+    return status;
+}

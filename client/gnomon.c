@@ -1,0 +1,55 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * gnomon: the clients of gnomond as one program with commands.
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "client/cmd.h"
+#include "common/text.h"
+#include "proto/attr.h"
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char *const argv[]);
+    const char *summary;
+} commands[] = {
+    {"probe", gn_cmd_probe, "stream environment frames: the light of the room"},
+    {"view", gn_cmd_view, "stream camera frames and poses, write the composited frames"},
+    {"doctor", gn_cmd_doctor, "say what on this machine works"},
+};
+
+static void print_help(FILE *out)
+{
+    fprintf(out, "usage: gnomon COMMAND [OPTION]...\n\nThe clients of gnomond:\n");
+    for (size_t i = 0; i < GN_ARRAY_LEN(commands); i++)
+        fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].summary);
+    fprintf(out, "\n`gnomon COMMAND --help` tells more. A first try: deploy/quickstart.\n");
+}
+
+int main(int argc, char *argv[])
+{
+    const char *name = argc > 1 ? argv[1] : "";
+    if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
+        print_help(stdout);
+        return 0;
+    }
+    if (strcmp(name, "--version") == 0) {
+        printf("gnomon %s\n", GN_VERSION);
+        return 0;
+    }
+    const char *meant = NULL;
+    for (size_t i = 0; i < GN_ARRAY_LEN(commands); i++) {
+        if (strcmp(name, commands[i].name) == 0)
+            return commands[i].run(argc - 1, argv + 1);
+        gn_text_suggest(name, commands[i].name, &meant);
+    }
+    if (!*name)
+        print_help(stderr);
+    else if (meant)
+        fprintf(stderr, "gnomon: no command '%s'; did you mean '%s'?\n", name, meant);
+    else
+        fprintf(stderr, "gnomon: no command '%s'; gnomon --help lists them\n", name);
+    return 2;
+}

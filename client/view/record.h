@@ -1,0 +1,36 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What a viewer leaves on disk: one picture per result, and view.json with every receipt.
+ */
+#ifndef GN_CLIENT_VIEW_RECORD_H
+#define GN_CLIENT_VIEW_RECORD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "client/lib/gnomon.h"
+#include "common/error.h"
+#include "proto/attr.h"
+
+struct gn_record;
+
+/** Creates the folder where it is missing. Returns 0, or a negative errno and a sentence. */
+GN_MUST_USE int gn_record_open(const char *dir, struct gn_record **out, struct gn_error *out_error);
+
+/**
+ * Writes NAME.png (or NAME.jpg, as it came) and keeps the receipt. latency_ms: from sending the
+ * frame to having the result. Returns 0, or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_record_add_result(struct gn_record *record, const char *name,
+                                     const struct gn_msg_result *result, const uint8_t *payload,
+                                     double latency_ms, struct gn_error *out_error);
+
+/** Notes a frame that was dropped. */
+GN_MUST_USE int gn_record_add_dropped(struct gn_record *record, const char *name,
+                                      const struct gn_msg_dropped *dropped);
+
+/** Writes view.json and frees. NULL-safe; nulls *record. Returns 0, or a negative errno. */
+GN_MUST_USE int gn_record_close(struct gn_record **record, struct gn_error *out_error);
+
+#endif
