@@ -9,6 +9,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -23,6 +24,8 @@
 
 // Largest mesh file, bytes: Assimp reads it whole, and takes some ten times as much.
 #define MAX_FILE_BYTES (1L << 30)
+// Largest header of a PLY file, bytes.
+#define MAX_PLY_HEADER 65536
 // Deepest nesting of nodes.
 #define MAX_DEPTH 256
 // Albedo of triangles without a material where others of the file have one.
@@ -47,6 +50,37 @@ static bool has_suffix(const char *path, const char *suffix)
     return n > m && strcasecmp(path + n - m, suffix) == 0;
 }
 
+/** Refuses PLY headers that Assimp reads for ever: without end, or that promise more elements than
+ * the file has bytes. */
+static int check_ply_header(const char *path, struct gn_error *out_error)
+{
+    char header[MAX_PLY_HEADER + 1];
+    FILE *file = fopen(path, "rbe");
+    if (!file)
+        return gn_error_set(out_error, -errno, "%s: cannot read the mesh: %s", path,
+                            strerror(errno));
+    size_t size = fread(header, 1, MAX_PLY_HEADER, file);
+    struct stat info = {0};
+    bool failed = ferror(file) != 0 || fstat(fileno(file), &info) != 0;
+    fclose(file);
+    if (failed)
+        return gn_error_set(out_error, -EIO, "%s: cannot read the mesh", path);
+    header[size] = '\0'; // the text ends at the first NUL, if any
+    const char *end = strstr(header, "end_header");
+    if (!end)
+        return gn_error_set(out_error, -EINVAL, "%s: its PLY header has no end_header in %d bytes",
+                            path, MAX_PLY_HEADER);
+    for (const char *line = header; (line = strstr(line, "element")) && line < end; line++) {
+        long long count = 0;
+        if (sscanf(line, "element %*63s %18lld", &count) == 1 &&
+            (count < 0 || count > (long long)info.st_size))
+            return gn_error_set(out_error, -EINVAL,
+                                "%s: its PLY header promises %lld elements in %lld bytes", path,
+                                count, (long long)info.st_size);
+    }
+    return 0;
+}
+
 static int check_file(const char *path, struct gn_error *out_error)
 {
     struct stat info;
@@ -63,7 +97,7 @@ static int check_file(const char *path, struct gn_error *out_error)
         return gn_error_set(out_error, -EINVAL,
                             "%s: unknown kind of mesh file; .obj, .gltf, .glb and .ply are read",
                             path);
-    return 0;
+    return has_suffix(path, ".ply") ? check_ply_header(path, out_error) : 0;
 }
 
 /** Only triangles are taken; points and lines are no surface. */
