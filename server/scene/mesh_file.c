@@ -50,8 +50,8 @@ static bool has_suffix(const char *path, const char *suffix)
     return n > m && strcasecmp(path + n - m, suffix) == 0;
 }
 
-/** Refuses PLY headers that Assimp reads for ever: without end, or that promise more elements than
- * the file has bytes. */
+/** Refuses PLY headers that Assimp reads for ever or takes all memory for: without end, with more
+ * elements than the file has bytes, or with lists counted in 32 bits. */
 static int check_ply_header(const char *path, struct gn_error *out_error)
 {
     char header[MAX_PLY_HEADER + 1];
@@ -77,6 +77,14 @@ static int check_ply_header(const char *path, struct gn_error *out_error)
             return gn_error_set(out_error, -EINVAL,
                                 "%s: its PLY header promises %lld elements in %lld bytes", path,
                                 count, (long long)info.st_size);
+    }
+    for (const char *line = header; (line = strstr(line, "property list")) && line < end; line++) {
+        char type[16] = "";
+        if (sscanf(line, "property list %15s", type) == 1 && !strstr(type, "char") &&
+            !strstr(type, "short") && !strstr(type, "int8") && !strstr(type, "int16"))
+            return gn_error_set(out_error, -EINVAL,
+                                "%s: its PLY lists are counted as %s; uchar and ushort are read",
+                                path, type);
     }
     return 0;
 }

@@ -354,6 +354,11 @@ static void test_bad_files_are_refused(void **state)
         {"huge.ply",
          "ply\nformat ascii 1.0\nelement vertex 2000000000\nproperty float x\nend_header\n1\n",
          "promises 2000000000 elements"},
+        {"list.ply",
+         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+         "property float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"
+         "0 0 0\n1 0 0\n0 1 0\n4294967295 0 1 2\n",
+         "counted as uint"},
     };
     for (size_t i = 0; i < LENGTH(cases); i++) {
         struct gn_mesh mesh = {0};
