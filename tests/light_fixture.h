@@ -10,6 +10,10 @@
 #include "common/image.h"
 #include "server/light/radiance_map.h"
 
+/** In double: cmocka's own comparison rounds to float first. Fails for NaN. */
+#define assert_near(value, expected, tolerance)                                                    \
+    assert_true(fabs((double)(value) - (double)(expected)) <= (double)(tolerance))
+
 /** A frame and the picture it borrows. */
 struct light_fixture {
     struct gn_image image;

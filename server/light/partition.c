@@ -221,7 +221,7 @@ static void classify_regions(struct partition *p, struct gn_light_figures *figur
 static double find_log_gain(struct partition *p, int64_t n_others)
 {
     int64_t wanted = p->settings->n_aim;
-    double low = -128, high = 128;
+    double low = -64, high = 64;
     if (wanted == 0) {
         if (choose_parts(p, 0) + n_others <= GN_LIGHTS_MAX)
             return 0;

@@ -109,6 +109,10 @@ static void split(const struct splitter *s, struct gn_split_item *items, int n,
     int n_below = partition(items, n, along, cut);
     struct gn_polar_box below = *box, above = *box;
     below.high[along] = above.low[along] = cut;
+    if (!s->is_midpoint) { // parts that one side has no points for are the other's
+        n_first = n_first > n_below ? n_below : n_first;
+        n_first = n_parts - n_first > n - n_below ? n_parts - (n - n_below) : n_first;
+    }
     split(s, items, n_below, &below, n_first, axis);
     split(s, items + n_below, n - n_below, &above, n_parts - n_first, axis);
 }

@@ -1,0 +1,374 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Spherical harmonics against published coefficients, closed forms and full sums. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "server/light/sh.h"
+#include "tests/light_fixture.h"
+
+/* C17 does not add the const to an array of arrays by itself. */
+#define CONST_SH(sh) ((const double(*)[3])(sh))
+
+static const double pi = 3.14159265358979323846;
+
+/* Ramamoorthi and Hanrahan's lights, order 00 1-1 10 11 2-2 2-1 20 21 22. */
+static const double grace[9][3] = {
+    {.78908, .43710, .54161},    {.39499, .34989, .60488},    {-.33974, -.18236, -.26940},
+    {-.29213, -.05562, .00944},  {-.11141, -.05090, -.12231}, {-.26240, -.22401, -.47479},
+    {-.15570, -.09471, -.14733}, {.56014, .21444, .13915},    {.21205, -.05432, -.30374}};
+static const double eucalyptus[9][3] = {
+    {.3783264, .4260425, .4504587},    {.2887813, .3586803, .4147053},
+    {.0379030, .0295216, .0098567},    {-.1033028, -.1031690, -.0884924},
+    {-.0621750, -.0554432, -.0396779}, {.0077820, -.0148312, -.0471301},
+    {-.0935561, -.1254260, -.1525629}, {-.0572703, -.0502192, -.0363410},
+    {.0203348, -.0044201, -.0452180}};
+static const double st_peter[9][3] = {
+    {.3623915, .2624130, .2326261},    {.1759131, .1436266, .1260569},
+    {-.0247311, -.0101254, -.0010745}, {.0346500, .0223184, .0101350},
+    {.0198140, .0144073, .0043987},    {-.0469596, -.0254485, -.0117786},
+    {-.0898667, -.0760911, -.0740964}, {.0050194, .0038841, .0001374},
+    {-.0818750, -.0321501, .0033399}};
+
+/* The basis, written out apart from the code under test. */
+static void get_basis(const double d[static 3], double out[static 9])
+{
+    double x = d[0], y = d[1], z = d[2];
+    out[0] = 0.5 * sqrt(1 / pi);
+    out[1] = sqrt(3 / (4 * pi)) * y;
+    out[2] = sqrt(3 / (4 * pi)) * z;
+    out[3] = sqrt(3 / (4 * pi)) * x;
+    out[4] = 0.5 * sqrt(15 / pi) * x * y;
+    out[5] = 0.5 * sqrt(15 / pi) * y * z;
+    out[6] = 0.25 * sqrt(5 / pi) * (3 * z * z - 1);
+    out[7] = 0.5 * sqrt(15 / pi) * x * z;
+    out[8] = 0.25 * sqrt(15 / pi) * (x * x - y * y);
+}
+
+static void get_sphere_point(int i, int n, double out[static 3])
+{
+    double z = 1 - 2 * (i + 0.5) / n, phi = i * pi * (3 - sqrt(5)), s = sqrt(1 - z * z);
+    out[0] = s * cos(phi);
+    out[1] = s * sin(phi);
+    out[2] = z;
+}
+
+static struct gn_radiance_map *make_map(struct light_fixture *f)
+{
+    struct gn_radiance_map *map = NULL;
+    struct gn_error error = {0};
+    if (gn_radiance_map_create(&f->frame, NULL, NULL, &map, &error) < 0)
+        fail_msg("%s", error.text);
+    return map;
+}
+
+static void irradiance_is_band_factor_times_basis(void **unused)
+{
+    (void)unused;
+    const double a[9] = {pi,        2 * pi / 3, 2 * pi / 3, 2 * pi / 3, 0.25 * pi,
+                         0.25 * pi, 0.25 * pi,  0.25 * pi,  0.25 * pi};
+    for (int i = 0; i < 50; i++) {
+        double n[3], basis[9], e[3];
+        get_sphere_point(i, 50, n);
+        get_basis(n, basis);
+        for (int k = 0; k < 9; k++) {
+            double sh[9][3] = {{0}};
+            sh[k][1] = 1;
+            gn_sh_get_irradiance(CONST_SH(sh), n, e);
+            assert_near(e[1], a[k] * basis[k], 1e-12);
+            assert_true(e[0] == 0 && e[2] == 0);
+        }
+    }
+}
+
+static void published_constants_come_out(void **unused)
+{
+    (void)unused;
+    double sh[9][3] = {{0}}, e[3];
+    sh[8][0] = 1; // c1 at +x; a known bug has c3 here
+    sh[3][1] = 1; // 2 c2 at +x
+    sh[0][2] = 1; // c4
+    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){1, 0, 0}, e);
+    assert_near(e[0], 0.429043, 5e-7);
+    assert_near(e[1], 2 * 0.511664, 2e-6); // published rounded up: 0.5116634
+    assert_near(e[2], 0.886227, 5e-7);
+    memset(sh, 0, sizeof(sh));
+    sh[6][0] = 1; // c3 - c5 at +z, -c5 at +x
+    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){0, 0, 1}, e);
+    assert_near(e[0], 0.743125 - 0.247708, 3e-6);
+    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){1, 0, 0}, e);
+    assert_near(e[0], -0.247708, 5e-7);
+}
+
+static void published_lights_evaluate(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const double (*sh)[3];
+        double normal[3], irradiance[3];
+    } cases[] = {
+        {grace, {0, 1, 0}, {1.051098, .792188, 1.265792}},
+        {grace, {0, -1, 0}, {.242689, .076084, .027811}},
+        {grace, {0, 0, 1}, {.274502, .153835, .131315}},
+        {grace, {1, 0, 0}, {.529906, .330607, .395827}},
+        {eucalyptus, {0, 1, 0}, {.645251, .777583, .880780}},
+        {eucalyptus, {0, -1, 0}, {.054215, .043488, .032021}},
+        {st_peter, {0, 1, 0}, {.558567, .412177, .352078}},
+        {st_peter, {0, -1, 0}, {.198533, .118223, .094083}},
+    };
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        double e[3];
+        gn_sh_get_irradiance(cases[i].sh, cases[i].normal, e);
+        for (int c = 0; c < 3; c++)
+            assert_near(e[c], cases[i].irradiance[c], 1e-6);
+    }
+    double min = 1, mean = 0;
+    enum { N = 20000 };
+    for (int i = 0; i < N; i++) { // real light that rings below zero
+        double n[3], e[3];
+        get_sphere_point(i, N, n);
+        gn_sh_get_irradiance(grace, n, e);
+        min = fmin(min, e[2]);
+        mean += e[2] / N;
+    }
+    assert_near(min, -0.0096, 5e-5);
+    assert_near(mean, pi * 0.282095 * grace[0][2], 1e-5);
+}
+
+/* A map with negative light cannot come from a frame: its pixels are written over. */
+static void check_projects_back(enum gn_projection_type type, int width, int height,
+                                const double sh[9][3])
+{
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, type, width, height), 0);
+    light_fixture_fill(&f, light_fixture_constant);
+    struct gn_radiance_map *map = make_map(&f);
+    for (int i = 0; i < width * height; i++) {
+        const float *d = map->direction_world + 3 * i;
+        double basis[9];
+        get_basis((double[3]){(double)d[0], (double)d[1], (double)d[2]}, basis);
+        for (int c = 0; c < 3; c++) {
+            double l = 0;
+            for (int k = 0; k < 9; k++)
+                l += sh[k][c] * basis[k];
+            map->radiance.data[3 * i + c] = (float)l;
+        }
+    }
+    double out[9][3];
+    assert_int_equal(gn_sh_project_map(map, NULL, out), 0);
+    for (int k = 0; k < 9; k++)
+        for (int c = 0; c < 3; c++)
+            assert_near(out[k][c], sh[k][c], 1e-4);
+    gn_radiance_map_unref(&map);
+    light_fixture_finish(&f);
+}
+
+static void synthesised_maps_project_back(void **unused)
+{
+    (void)unused;
+    check_projects_back(GN_PROJECTION_ANGULAR, 400, 400, grace);
+    check_projects_back(GN_PROJECTION_ANGULAR, 400, 400, eucalyptus);
+    check_projects_back(GN_PROJECTION_MIRRORBALL, 400, 400, st_peter);
+    check_projects_back(GN_PROJECTION_LATLONG, 256, 128, grace);
+    check_projects_back(GN_PROJECTION_LATLONG, 256, 128, st_peter);
+}
+
+static void constant_map_is_pi(void **unused)
+{
+    (void)unused;
+    static const struct {
+        enum gn_projection_type type;
+        int width, height;
+        double tolerance;
+    } cases[] = {{GN_PROJECTION_LATLONG, 64, 32, 1e-6},
+                 {GN_PROJECTION_LATLONG, 1, 1, 1e-6},
+                 {GN_PROJECTION_LATLONG, 7, 3, 1e-6},
+                 {GN_PROJECTION_ANGULAR, 500, 500, 5e-5},
+                 {GN_PROJECTION_MIRRORBALL, 500, 500, 5e-5}};
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        struct light_fixture f;
+        assert_int_equal(light_fixture_init(&f, cases[i].type, cases[i].width, cases[i].height), 0);
+        light_fixture_fill(&f, light_fixture_constant);
+        struct gn_radiance_map *map = make_map(&f);
+        double sh[9][3], e[3];
+        assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+        for (int k = 1; k < 9; k++)
+            assert_near(sh[k][0], 0, cases[i].tolerance);
+        gn_sh_get_irradiance(CONST_SH(sh), (double[3]){0.6, 0, 0.8}, e);
+        assert_near(e[0], pi, 5 * cases[i].tolerance);
+        gn_radiance_map_unref(&map);
+        light_fixture_finish(&f);
+    }
+}
+
+static void linear_light(const double dir[static 3], float out[static 3])
+{
+    out[0] = (float)fmax(0, dir[2]);
+    out[1] = (float)(1 + dir[0]);
+    out[2] = (float)(1 - dir[1] * dir[2]);
+}
+
+static void analytic_maps_have_their_coefficients(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
+    light_fixture_fill(&f, linear_light);
+    struct gn_radiance_map *map = make_map(&f);
+    double sh[9][3];
+    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    /* max(0, z): A_l / 2pi times the zonal basis at +z, the clamped cosine itself */
+    assert_near(sh[0][0], sqrt(pi) / 2, 1e-4);
+    assert_near(sh[2][0], sqrt(pi / 3), 1e-4);
+    assert_near(sh[6][0], sqrt(5 * pi) / 8, 1e-4);
+    assert_near(sh[3][1], sqrt(4 * pi / 3), 1e-4);
+    assert_near(sh[5][2], -2 * sqrt(pi / 15), 1e-4);
+    gn_radiance_map_unref(&map);
+    light_fixture_finish(&f);
+}
+
+static void delta_light_errs_as_known(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 2048, 1024), 0);
+    f.frame.codes = &f.image;
+    double w = gn_projection_get_solid_angle(&f.frame.projection, 700, 400), l[3];
+    gn_image_at(&f.image, 700, 400)[1] = (float)(1 / w);
+    assert_true(gn_projection_get_direction(&f.frame.projection, 700.5, 400.5, l));
+    struct gn_radiance_map *map = make_map(&f);
+    double sh[9][3], worst = 0, mean = 0, low = 1, high = 0;
+    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    enum { N = 40000 };
+    for (int i = 0; i < N; i++) {
+        double n[3], e[3];
+        get_sphere_point(i, N, n);
+        gn_sh_get_irradiance(CONST_SH(sh), n, e);
+        double error = fabs(e[1] - fmax(0, n[0] * l[0] + n[1] * l[1] + n[2] * l[2]));
+        worst = fmax(worst, error);
+        mean += error / N;
+        low = fmin(low, e[1]);
+        high = fmax(high, e[1]);
+    }
+    assert_near(worst, 0.09375, 2e-4);
+    assert_near(mean, 0.0307, 2e-4);
+    assert_near(low, -0.0396, 2e-4);
+    assert_near(high, 1.0625, 2e-4);
+    gn_radiance_map_unref(&map);
+    light_fixture_finish(&f);
+}
+
+static void broad_light(const double dir[static 3], float out[static 3])
+{
+    out[0] = (float)exp(1.2 * dir[2] + 0.3 * dir[0]);
+    out[1] = (float)(1.5 + sin(2 * dir[0]) * cos(dir[1]));
+    out[2] = (float)(1 + pow(fmax(0, dir[1]), 4));
+}
+
+static void broad_light_is_within_one_and_a_half_percent(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 128, 64), 0);
+    light_fixture_fill(&f, broad_light);
+    struct gn_radiance_map *map = make_map(&f);
+    double sh[9][3], squares[3] = {0}, total[3] = {0};
+    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    for (int i = 0; i < 200; i++) {
+        double n[3], e[3], exact[3] = {0};
+        get_sphere_point(i, 200, n);
+        for (int t = 0; t < 128 * 64; t++) {
+            const float *d = map->direction_world + 3 * t;
+            double dot = n[0] * (double)d[0] + n[1] * (double)d[1] + n[2] * (double)d[2];
+            for (int c = 0; c < 3; c++)
+                exact[c] += fmax(dot, 0) * (double)map->solid_angle[t] *
+                            (double)map->radiance.data[3 * t + c];
+        }
+        gn_sh_get_irradiance(CONST_SH(sh), n, e);
+        for (int c = 0; c < 3; c++) {
+            squares[c] += (e[c] - exact[c]) * (e[c] - exact[c]);
+            total[c] += exact[c] * exact[c];
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        assert_true(sqrt(squares[c] / total[c]) <= 0.015);
+    gn_radiance_map_unref(&map);
+    light_fixture_finish(&f);
+}
+
+static void turning_the_probe_turns_the_light(void **unused)
+{
+    (void)unused;
+    static const enum gn_projection_type types[2] = {GN_PROJECTION_LATLONG, GN_PROJECTION_ANGULAR};
+    struct gn_pose turn = {.rotation = {0.5, -0.5, 0.1, 0.7}};
+    assert_int_equal(gn_pose_normalize(&turn), 0);
+    for (int t = 0; t < 2; t++) {
+        struct light_fixture f;
+        assert_int_equal(light_fixture_init(&f, types[t], t ? 200 : 256, t ? 200 : 128), 0);
+        light_fixture_fill(&f, broad_light);
+        struct gn_radiance_map *still = make_map(&f);
+        memcpy(f.frame.world_from_probe, turn.rotation, sizeof(turn.rotation));
+        struct gn_radiance_map *turned = make_map(&f);
+        double sh[9][3], sh_turned[9][3];
+        assert_int_equal(gn_sh_project_map(still, NULL, sh), 0);
+        assert_int_equal(gn_sh_project_map(turned, NULL, sh_turned), 0);
+        for (int i = 0; i < 50; i++) {
+            double n[3], n_world[3], e[3], e_turned[3];
+            get_sphere_point(i, 50, n);
+            gn_pose_rotate(&turn, n, n_world);
+            gn_sh_get_irradiance(CONST_SH(sh), n, e);
+            gn_sh_get_irradiance(CONST_SH(sh_turned), n_world, e_turned);
+            for (int c = 0; c < 3; c++)
+                assert_near(e[c], e_turned[c], 1e-5);
+        }
+        gn_radiance_map_unref(&still);
+        gn_radiance_map_unref(&turned);
+        light_fixture_finish(&f);
+    }
+}
+
+static void irradiance_map_holds_clamped_irradiance(void **unused)
+{
+    (void)unused;
+    struct gn_image map;
+    int n_clamped = 0;
+    assert_int_equal(gn_sh_make_irradiance_map(grace, 64, 32, &map), 0);
+    for (int y = 0; y < 32; y++) {
+        for (int x = 0; x < 64; x++) {
+            double theta = pi * (y + 0.5) / 32, phi = pi - 2 * pi * (x + 0.5) / 64, e[3];
+            double n[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
+            gn_sh_get_irradiance(grace, n, e);
+            n_clamped += e[2] < 0;
+            for (int c = 0; c < 3; c++)
+                assert_near(gn_image_at(&map, x, y)[c], fmax(e[c], 0), 1e-6);
+        }
+    }
+    assert_true(n_clamped > 0);
+    gn_image_finish(&map);
+    assert_true(gn_sh_make_irradiance_map(grace, 0, 32, &map) < 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(irradiance_is_band_factor_times_basis),
+        cmocka_unit_test(published_constants_come_out),
+        cmocka_unit_test(published_lights_evaluate),
+        cmocka_unit_test(synthesised_maps_project_back),
+        cmocka_unit_test(constant_map_is_pi),
+        cmocka_unit_test(analytic_maps_have_their_coefficients),
+        cmocka_unit_test(delta_light_errs_as_known),
+        cmocka_unit_test(broad_light_is_within_one_and_a_half_percent),
+        cmocka_unit_test(turning_the_probe_turns_the_light),
+        cmocka_unit_test(irradiance_map_holds_clamped_irradiance),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
