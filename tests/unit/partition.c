@@ -165,7 +165,7 @@ static void each_reading_can_be_mended(void **unused)
     (void)unused;
     struct light_fixture f;
     make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 150, 150);
-    gn_image_at(&f.image, 60, 70)[1] = 3000; // what a smoothed maximum leaves out
+    gn_image_at(&f.image, 60, 70)[1] = 600; // what a smoothed maximum leaves out
     struct gn_light_options options[2] = {
         {.method = GN_LIGHT_PARTITION_SEED, .max_ls = 16},
         {.method = GN_LIGHT_PARTITION_SEED, .max_ls = 2, .metric = GN_METRIC_LOG2}};
