@@ -77,6 +77,7 @@ struct reader {
     exr_context_t context;
     exr_attr_box2i_t window;
     exr_storage_t storage;
+    bool is_dwa;
     const exr_attr_chlist_t *channels;
     struct gn_exr_info info;
 };
@@ -103,14 +104,20 @@ static int check_size(struct reader *r, struct gn_error *out_error)
     r->info.width = (int)width;
     r->info.height = (int)height;
     uint64_t bytes_per_pixel = 0;
-    r->info.is_core = true;
+    r->info.is_core = !r->is_dwa;
     for (int i = 0; i < r->channels->num_channels; i++) {
         const exr_attr_chlist_entry_t *c = &r->channels->entries[i];
         bytes_per_pixel += c->pixel_type == EXR_PIXEL_HALF ? 2 : 4;
         if (c->x_sampling != 1 || c->y_sampling != 1)
             r->info.is_core = false;
     }
-    if ((uint64_t)(width * height) * bytes_per_pixel > MAX_SAMPLE_BYTES)
+    /* Deflate, the tightest of the codecs, makes at most 1032 bytes of one; DWA packs 64 into 1
+     * before it deflates. */
+    uint64_t n_bytes = (uint64_t)(width * height) * bytes_per_pixel;
+    if (n_bytes / (r->is_dwa ? 64 * 1032 : 1032) > r->stream.size)
+        return gn_error_set(out_error, -EINVAL, "EXR picture: %jd x %jd px cannot be in %ju bytes",
+                            (intmax_t)width, (intmax_t)height, (uintmax_t)r->stream.size);
+    if (n_bytes > MAX_SAMPLE_BYTES)
         return gn_error_set(out_error, -EINVAL,
                             "EXR picture of %jd x %jd px with %d channels: more than 4 GiB",
                             (intmax_t)width, (intmax_t)height, r->channels->num_channels);
@@ -152,11 +159,10 @@ static int open_reader(struct reader *r, const void *data, size_t size, struct g
                               "EXR picture: deep data; only scanlines and tiles are read");
         goto fail;
     }
+    r->is_dwa = compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB;
     status = check_size(r, out_error);
     if (status)
         goto fail;
-    if (compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB)
-        r->info.is_core = false;
     if (find_channel(r, "R") && find_channel(r, "G") && find_channel(r, "B"))
         r->info.channels = 3;
     else if (find_channel(r, "Y"))

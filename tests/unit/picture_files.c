@@ -81,7 +81,7 @@ static void test_hdr_old_runs_and_exposure(void **state)
 static void test_hdr_refusals(void **state)
 {
     (void)state;
-    static const uint8_t pixels[64] = {2, 2, 0, 8, 0};
+    static const uint8_t pixels[64] = {2, 2, 0, 8, 0, 136, 1, 136, 1, 136, 1, 136, 1};
     static const struct {
         const char *head, *word;
     } cases[] = {
