@@ -1,0 +1,117 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * gnomon-render: one frame from files to files, without any server.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "common/clock.h"
+#include "server/render_cli/cli.h"
+
+/** All that a run owns. */
+struct run {
+    struct gn_pool *pool;
+    struct gn_scene *scene;
+    struct gn_lighting_state *light;
+    struct gn_renderer *renderer;
+    struct gn_camera camera;
+    struct gn_cli_background background;
+    struct gn_layers layers;
+    struct gn_render_report report;
+    double ms_scene, ms_light;
+};
+
+static double get_ms_since(int64_t start_ns)
+{
+    return 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
+}
+
+static int read_inputs(const struct gn_cli_request *request, struct run *run,
+                       struct gn_error *out_error)
+{
+    int ret = gn_camera_read_file(request->camera, &run->camera, out_error);
+    if (ret == 0 && request->background)
+        ret =
+            gn_cli_background_read(request->background, &run->camera, &run->background, out_error);
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    if (ret == 0)
+        ret = gn_scene_read_file(request->scene, run->pool, &run->scene, out_error);
+    run->ms_scene = get_ms_since(start_ns);
+    start_ns = gn_clock_get_monotonic_ns();
+    if (ret == 0)
+        ret = gn_cli_read_light(request, run->pool, &run->light, out_error);
+    run->ms_light = get_ms_since(start_ns);
+    return ret;
+}
+
+static int render(const struct gn_cli_request *request, struct run *run, struct gn_error *out_error)
+{
+    int ret = gn_renderer_create(run->scene, run->pool, &run->renderer, out_error);
+    if (ret < 0)
+        return ret;
+    if ((ret = gn_layers_init(&run->layers, run->camera.width, run->camera.height)) < 0)
+        return gn_error_set(out_error, ret, "no memory for layers of %d x %d pixels",
+                            run->camera.width, run->camera.height);
+    return gn_renderer_render(run->renderer, &run->camera, run->light, &request->render,
+                              &run->layers, &run->report, out_error);
+}
+
+static int run_request(const struct gn_cli_request *request, struct gn_error *out_error)
+{
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    struct run run = {0};
+    int ret = gn_cli_check_outputs(request, out_error);
+    if (ret < 0)
+        return ret;
+    if ((ret = gn_pool_create(request->n_threads, &run.pool)) < 0) {
+        (void)gn_error_set(out_error, ret, "cannot start %d threads", request->n_threads);
+        goto out;
+    }
+    ret = read_inputs(request, &run, out_error);
+    if (ret == 0)
+        ret = render(request, &run, out_error);
+    if (ret < 0)
+        goto out;
+    const struct gn_cli_result result = {
+        .camera = &run.camera,
+        .scene = run.scene,
+        .light = run.light,
+        .layers = &run.layers,
+        .background = request->background ? &run.background : NULL,
+        .report = &run.report,
+        .n_threads = gn_pool_get_size(run.pool),
+        .ms_scene = run.ms_scene,
+        .ms_light = run.ms_light,
+        .ms_total = get_ms_since(start_ns),
+    };
+    ret = gn_cli_write_outputs(request, &result, run.pool, out_error);
+out:
+    gn_layers_finish(&run.layers);
+    gn_cli_background_finish(&run.background);
+    gn_renderer_destroy(&run.renderer);
+    gn_lighting_state_unref(&run.light);
+    gn_scene_destroy(&run.scene);
+    gn_pool_destroy(&run.pool);
+    return ret;
+}
+
+int main(int argc, char *argv[])
+{
+    struct gn_error error = {0};
+    struct gn_cli_request request;
+    int ret = gn_cli_request_init(&request, argc, argv, &error);
+    if (ret == 0 && gn_options_wants_help(request.options))
+        gn_options_print_help(&gn_cli_program, stdout);
+    else if (ret == 0 && gn_options_wants_version(request.options))
+        printf("gnomon-render %s\n", GN_VERSION);
+    else if (ret == 0)
+        ret = run_request(&request, &error);
+    gn_cli_request_finish(&request);
+    if (ret == 0 && fflush(stdout) != 0)
+        ret = gn_error_set(&error, -1, "cannot write to standard output");
+    if (ret == 0)
+        return EXIT_SUCCESS;
+    fprintf(stderr, "gnomon-render: %s\n", error.text);
+    return EXIT_FAILURE;
+}

@@ -1,0 +1,96 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * The parts of gnomon-render: options, inputs, outputs, report. Thread-safety of all: main thread.
+ */
+#ifndef GN_SERVER_RENDER_CLI_CLI_H
+#define GN_SERVER_RENDER_CLI_CLI_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/camera.h"
+#include "common/error.h"
+#include "common/image.h"
+#include "common/options.h"
+#include "common/pool.h"
+#include "proto/attr.h"
+#include "server/light/state.h"
+#include "server/render/render.h"
+#include "server/scene/scene.h"
+
+/** gnomon-render's options and help. */
+extern const struct gn_program gn_cli_program;
+
+/** What the command line asks for. Strings borrowed from options. */
+struct gn_cli_request {
+    struct gn_options *options; // owned
+    const char *scene, *env, *camera, *out;
+    const char *env_params, *background, *report, *shadow_png, *composite_png; // may be NULL
+    bool has_projection;
+    enum gn_projection_type projection;
+    bool has_world_from_env;
+    double world_from_env[4]; // quaternion w, x, y, z
+    struct gn_light_options light;
+    struct gn_render_options render;
+    int n_threads; // 0: one per processor
+};
+
+/**
+ * Reads and checks the command line. Returns 0, or a negative errno and a sentence. Where --help or
+ * --version was asked for, nothing else is checked.
+ */
+GN_MUST_USE int gn_cli_request_init(struct gn_cli_request *request, int argc, char *const argv[],
+                                    struct gn_error *out_error);
+/** A zeroed one is fine. */
+void gn_cli_request_finish(struct gn_cli_request *request);
+
+/** Reads the environment picture and makes the lighting state. */
+GN_MUST_USE int gn_cli_read_light(const struct gn_cli_request *request, struct gn_pool *pool,
+                                  struct gn_lighting_state **out_state, struct gn_error *out_error);
+
+/** The camera picture: as linear radiance, and as its codes where it has 8 bits. */
+struct gn_cli_background {
+    struct gn_image linear;  // [h][w][3]
+    struct gn_image8 codes8; // [h][w][3], or zeroed
+};
+
+/** Reads the background, which must be of the camera's size. */
+GN_MUST_USE int gn_cli_background_read(const char *path, const struct gn_camera *camera,
+                                       struct gn_cli_background *out_background,
+                                       struct gn_error *out_error);
+/** A zeroed one is fine. */
+void gn_cli_background_finish(struct gn_cli_background *background);
+
+/** What is written. Borrowed. */
+struct gn_cli_result {
+    const struct gn_camera *camera;
+    const struct gn_scene *scene;
+    const struct gn_lighting_state *light;
+    const struct gn_layers *layers;
+    const struct gn_cli_background *background; // NULL: none
+    const struct gn_render_report *report;
+    int n_threads;
+    double ms_scene, ms_light, ms_total;
+};
+
+/** Refuses outputs that cannot be written or share a path, before anything is rendered. */
+GN_MUST_USE int gn_cli_check_outputs(const struct gn_cli_request *request,
+                                     struct gn_error *out_error);
+
+/**
+ * Writes all that was asked for, each file whole or not at all, the layers last. On failure the
+ * files that this call has written are removed.
+ */
+GN_MUST_USE int gn_cli_write_outputs(const struct gn_cli_request *request,
+                                     const struct gn_cli_result *result, struct gn_pool *pool,
+                                     struct gn_error *out_error);
+
+/** Writes report.json. */
+GN_MUST_USE int gn_cli_write_report(const struct gn_cli_request *request,
+                                    const struct gn_cli_result *result, struct gn_error *out_error);
+
+/** "interactive", "seed", "reference". */
+const char *gn_cli_get_quality_name(enum gn_quality quality);
+
+#endif

@@ -1,0 +1,85 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <jansson.h>
+
+#include "common/file.h"
+#include "server/render_cli/cli.h"
+
+static json_t *make_plan(const struct gn_render_report *report)
+{
+    json_t *plan = json_array();
+    for (int i = 0; i < report->n_plan; i++) {
+        const struct gn_plan_entry *entry = &report->plan[i];
+        // A failure to append leaves the whole NULL in the end: json_pack refuses a NULL inside.
+        if (json_array_append_new(plan, json_pack("{s:s, s:b, s:s}", "pass", entry->pass, "ran",
+                                                  (int)entry->ran, "why", entry->why)) < 0) {
+            json_decref(plan);
+            return NULL;
+        }
+    }
+    return plan;
+}
+
+static json_t *make_timings(const struct gn_cli_result *result)
+{
+    const struct gn_render_report *r = result->report;
+    const struct gn_lighting_state *light = result->light;
+    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "scene",
+                     result->ms_scene, "light", result->ms_light, "map", light->ms_map, "sh",
+                     light->ms_sh, "lights", light->ms_lights, "plan", r->ms_plan, "primary",
+                     r->ms_primary, "shade", r->ms_shade, "shadow", r->ms_shadow, "render",
+                     r->ms_total, "total", result->ms_total);
+}
+
+static json_t *make_rays(const struct gn_render_report *r)
+{
+    return json_pack("{s:I, s:I, s:I, s:I}", "primary", (json_int_t)r->rays_primary, "mirror",
+                     (json_int_t)r->rays_mirror, "shade", (json_int_t)r->rays_shade, "shadow",
+                     (json_int_t)r->rays_shadow);
+}
+
+static json_t *make_map(const struct gn_radiance_map *map)
+{
+    const struct gn_radiance_map_figures *f = &map->figures;
+    return json_pack("{s:s, s:i, s:i, s:f, s:f, s:i, s:i, s:i, s:i}", "projection",
+                     gn_projection_get_name(map->projection.type), "width", map->projection.width,
+                     "height", map->projection.height, "mean_luminance", f->mean_luminance,
+                     "max_luminance", f->max_luminance, "nan_texels", f->n_nan, "inf_texels",
+                     f->n_inf, "negative_texels", f->n_negative, "clipped_texels", f->n_clipped);
+}
+
+/** NULL where memory runs out. */
+static json_t *make_report(const struct gn_cli_request *request, const struct gn_cli_result *result)
+{
+    const struct gn_render_report *r = result->report;
+    const struct gn_scene *scene = result->scene;
+    return json_pack(
+        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
+        "s:I, s:{s:i, s:i, s:i}}",
+        "version", GN_VERSION, "quality", gn_cli_get_quality_name(request->render.quality),
+        "bounces", request->render.bounces, "width", result->camera->width, "height",
+        result->camera->height, "threads", result->n_threads, "light_method",
+        gn_light_method_get_name(request->light.method), "plan", make_plan(r), "timings_ms",
+        make_timings(result), "rays", make_rays(r), "environment", make_map(result->light->map),
+        "lights", r->n_lights, "estimated_error",
+        r->estimated_error < 0.0 ? json_null() : json_real(r->estimated_error), "virtual_pixels",
+        (json_int_t)r->n_virtual_pixels, "shadow_pixels", (json_int_t)r->n_shadow_pixels,
+        "refined_pixels", (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects,
+        "real_triangles", scene->n_real_triangles, "virtual_triangles", scene->n_virtual_triangles);
+}
+
+int gn_cli_write_report(const struct gn_cli_request *request, const struct gn_cli_result *result,
+                        struct gn_error *out_error)
+{
+    json_t *report = make_report(request, result);
+    char *text = report ? json_dumps(report, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) : NULL;
+    int ret = text ? gn_file_write(request->report, text, strlen(text), out_error)
+                   : gn_error_set(out_error, -ENOMEM, "%s: out of memory", request->report);
+    free(text);
+    json_decref(report);
+    return ret;
+}
