@@ -107,10 +107,10 @@ static double kb_theta(const double k[static 4], double theta_max, double rho)
         else
             low = t;
         double next = t - error / kb_slope(k, t);
+        if (fabs(next - t) <= 1e-11 * theta_max) // the next step would be its square
+            return fmin(fmax(next, 0), theta_max);
         if (!(next > low && next < high))
             next = 0.5 * (low + high);
-        if (fabs(next - t) <= 1e-15 * theta_max)
-            return next;
         t = next;
     }
     return t;
