@@ -1,0 +1,87 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "tests/rig/room.h"
+
+#include <errno.h>
+#include <string.h>
+
+#include "tests/rig/vec.h"
+
+int gn_rig_room_add(struct gn_rig_room *room, struct gn_rig_object *object)
+{
+    if (room->n_objects == GN_RIG_MAX_OBJECTS)
+        return -ENOSPC;
+    room->objects[room->n_objects++] = *object;
+    memset(&object->mesh, 0, sizeof(object->mesh));
+    return 0;
+}
+
+int gn_rig_room_commit(struct gn_rig_room *room, struct gn_pool *pool, struct gn_error *out_error)
+{
+    int result = gn_rt_create(&room->rt, out_error);
+    for (int i = 0; result == 0 && i < room->n_objects; i++) {
+        const struct gn_rig_object *o = &room->objects[i];
+        result = gn_rt_add_mesh(room->rt, o->role, (uint32_t)i, &o->mesh, o->world_from_object,
+                                out_error);
+    }
+    return result ? result : gn_rt_commit(room->rt, pool, out_error);
+}
+
+void gn_rig_room_finish(struct gn_rig_room *room)
+{
+    for (int i = 0; i < room->n_objects; i++)
+        gn_mesh_finish(&room->objects[i].mesh);
+    gn_rt_destroy(&room->rt);
+    memset(room, 0, sizeof(*room));
+}
+
+int gn_rig_room_count_triangles(const struct gn_rig_room *room)
+{
+    int sum = 0;
+    for (int i = 0; i < room->n_objects; i++)
+        sum += room->objects[i].mesh.n_triangles;
+    return sum;
+}
+
+/* The interpolated normal in world coordinates. The matrix turns and scales alike, so its 3x3 part
+ * turns normals too. */
+static void get_shading_normal(const struct gn_rig_object *object, const struct gn_rt_hit *hit,
+                               double out_normal[static 3])
+{
+    const uint32_t *tri = object->mesh.triangles + 3 * (size_t)hit->triangle;
+    const double weight[3] = {1.0 - hit->u - hit->v, hit->u, hit->v},
+                 *m = object->world_from_object;
+    double n[3] = {0};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            n[k] += weight[i] * object->mesh.normals[3 * (size_t)tri[i] + (size_t)k];
+    for (int k = 0; k < 3; k++)
+        out_normal[k] = m[4 * k] * n[0] + m[4 * k + 1] * n[1] + m[4 * k + 2] * n[2];
+    vec_normalize(out_normal);
+}
+
+void gn_rig_room_get_surface(const struct gn_rig_room *room, const double dir[static 3],
+                             const struct gn_rt_hit *hit, struct gn_rig_surface *out_surface)
+{
+    const struct gn_rig_object *object = &room->objects[hit->object];
+    struct gn_rig_surface s = {.clearance = hit->clearance,
+                               .is_mirror = object->finish == GN_RIG_MIRROR,
+                               .is_virtual = object->role == GN_RT_VIRTUAL};
+    for (int k = 0; k < 3; k++) {
+        s.point[k] = hit->point[k];
+        s.normal_geometric[k] = hit->normal[k];
+        s.albedo[k] = object->mesh.albedos
+                          ? object->mesh.albedos[3 * (size_t)hit->triangle + (size_t)k]
+                          : object->albedo[k];
+    }
+    gn_rig_finish_get_albedo(object->finish, s.point, s.albedo);
+    if (vec_dot(s.normal_geometric, dir) > 0)
+        vec_scale(s.normal_geometric, -1, s.normal_geometric);
+    memcpy(s.normal_shading, s.normal_geometric, sizeof(s.normal_shading));
+    if (object->mesh.normals) {
+        get_shading_normal(object, hit, s.normal_shading);
+        if (vec_dot(s.normal_shading, s.normal_geometric) < 0)
+            vec_scale(s.normal_shading, -1, s.normal_shading);
+    }
+    *out_surface = s;
+}

@@ -1,0 +1,68 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * The rig's cameras, written apart from common/camera and common/projection: the pinhole that takes
+ * the pictures, and the fisheye or light probe that takes the light.
+ * Camera and probe frames: x right, y down, z along the optical axis; pixel centres at
+ * half-integers.
+ */
+#ifndef GN_TESTS_RIG_VIEW_H
+#define GN_TESTS_RIG_VIEW_H
+
+#include <stdbool.h>
+
+#include "common/image.h"
+#include "common/pool.h"
+#include "proto/attr.h"
+#include "tests/rig/environment.h"
+
+/** The camera of one frame. */
+struct gn_rig_view {
+    int width, height;            // px
+    double fx, fy, cx, cy;        // px
+    double distortion[5];         // k1, k2, p1, p2, k3 of Brown and Conrady, OpenCV's order
+    double world_from_camera[16]; // rigid, row-major
+};
+
+/** Unit world direction through picture position (x, y) px. */
+void gn_rig_view_get_ray(const struct gn_rig_view *view, double x, double y,
+                         double out_dir[static 3]);
+
+/** A rigid matrix for a camera at `position` that looks at `target` with world +z upwards. */
+void gn_rig_look_at(const double position[static 3], const double target[static 3],
+                    double out_world_from_camera[static 16]);
+
+/** Which picture a probe takes. */
+enum gn_rig_probe {
+    GN_RIG_FISHEYE = 0, // equidistant, 180 degrees: r = R theta / (pi/2)
+    GN_RIG_ANGULAR = 1, // Debevec's light probe, 360 degrees: r = R theta / pi
+};
+
+/**
+ * What a probe at `position` sees of the environment: each pixel the mean radiance over the part of
+ * it that lies in the circle, from 16 x 16 points; 0 outside. world_from_probe: 3x3, row-major.
+ */
+GN_MUST_USE int gn_rig_take_probe(const struct gn_rig_environment *env, enum gn_rig_probe probe,
+                                  int size, const double world_from_probe[static 9],
+                                  const double position[static 3], struct gn_pool *pool,
+                                  struct gn_image *out_image);
+
+/** Quaternion w, x, y, z of a rotation matrix (3x3, row-major), w >= 0 (Shepperd 1978). */
+void gn_rig_get_quaternion(const double m[static 9], double out_q[static 4]);
+
+/** An HDRC-like sensor: code = a + b ln(c + radiance), as a share of full scale. */
+struct gn_rig_log_sensor {
+    double a, b, c;
+};
+
+/** The sensor whose codes 0 and 4095 are radiance 0 and `highest`, and whose dark current c is a
+ * millionth of `highest` or a thousandth of `mean`, whichever is less. */
+struct gn_rig_log_sensor gn_rig_make_log_sensor(double mean, double highest);
+/** The 12-bit code, rounded and clamped; and back. */
+int gn_rig_encode_log12(const struct gn_rig_log_sensor *sensor, double radiance);
+double gn_rig_decode_log12(const struct gn_rig_log_sensor *sensor, double code);
+
+/** IEC 61966-2-1: linear to an 8-bit code, clamped, before rounding. */
+double gn_rig_encode_srgb8(double linear);
+
+#endif
