@@ -1,0 +1,270 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/scene/scene.h"
+
+#include <errno.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "common/pose.h"
+#include "tests/meshes.h"
+
+#define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
+
+static char folder[64];
+static char manifest[128]; // folder/scene.json
+
+static void write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_true(fputs(text, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
+static const char *get_path(const char *name)
+{
+    static char path[128];
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
+    return path;
+}
+
+/** A folder with two meshes: a.obj without colours and red.obj with them. */
+static int set_up(void **state)
+{
+    (void)state;
+    (void)snprintf(folder, sizeof(folder), "/tmp/gnomon-scene-XXXXXX");
+    if (!mkdtemp(folder))
+        return -1;
+    (void)snprintf(manifest, sizeof(manifest), "%s/scene.json", folder);
+    write_text(get_path("a.obj"), "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
+    write_text(get_path("red.obj"), "mtllib red.mtl\nusemtl red\n"
+                                    "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
+    write_text(get_path("red.mtl"), "newmtl red\nKd 0.75 0.25 0.125\n");
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    (void)unlink(get_path("a.obj"));
+    (void)unlink(get_path("red.obj"));
+    (void)unlink(get_path("red.mtl"));
+    (void)unlink(manifest);
+    return rmdir(folder);
+}
+
+static int read_scene(const char *json, struct gn_scene **out_scene, struct gn_error *error)
+{
+    write_text(manifest, json);
+    *error = (struct gn_error){0};
+    return gn_scene_read_file(manifest, NULL, out_scene, error);
+}
+
+/** The surface straight below (x, y, 10). */
+static struct gn_surface look_down(const struct gn_scene *scene, float x, float y)
+{
+    const float org[3] = {x, y, 10.0f};
+    const float down[3] = {0.0f, 0.0f, -1.0f};
+    struct gn_rt_hit hit;
+    struct gn_surface surface;
+    assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, org, down, 0.0f, INFINITY, &hit));
+    gn_scene_get_surface(scene, down, &hit, &surface);
+    return surface;
+}
+
+static void test_manifest_is_read(void **state)
+{
+    (void)state;
+    struct gn_scene *scene = NULL;
+    struct gn_error error;
+    int ret =
+        read_scene("{\"objects\":["
+                   "{\"mesh\":\"a.obj\",\"role\":\"real\"},"
+                   "{\"mesh\":\"red.obj\",\"role\":\"virtual\",\"name\":\"a red square\","
+                   " \"world_from_object\":[1,0,0,5, 0,1,0,0, 0,0,1,2, 0,0,0,1]},"
+                   "{\"mesh\":\"red.obj\",\"role\":\"virtual\",\"material\":{\"type\":\"diffuse\"},"
+                   " \"world_from_object\":[1,0,0,10, 0,1,0,0, 0,0,1,0, 0,0,0,1]},"
+                   "{\"mesh\":\"red.obj\",\"role\":\"virtual\","
+                   " \"material\":{\"type\":\"diffuse\",\"albedo\":[0.1,0.2,0.3]},"
+                   " \"world_from_object\":[1,0,0,15, 0,1,0,0, 0,0,1,0, 0,0,0,1]},"
+                   "{\"mesh\":\"a.obj\",\"role\":\"virtual\",\"material\":{\"type\":\"mirror\"},"
+                   " \"world_from_object\":[1,0,0,20, 0,1,0,0, 0,0,1,0, 0,0,0,1]}"
+                   "],\"lights\":[]}",
+                   &scene, &error);
+    assert_string_equal(error.text, "");
+    assert_int_equal(ret, 0);
+    assert_int_equal(scene->n_objects, 5);
+    assert_int_equal(scene->n_real_triangles, 2);
+    assert_int_equal(scene->n_virtual_triangles, 8);
+    assert_string_equal(scene->objects[0].name, "a.obj");
+    assert_string_equal(scene->objects[1].name, "a red square");
+
+    struct gn_surface s = look_down(scene, 0.1f, 0.2f);
+    assert_int_equal(s.role, GN_RT_REAL);
+    assert_float_equal(s.albedo[0], 0.5f, 0.0); // neither the mesh nor the manifest says more
+    s = look_down(scene, 5.1f, 0.2f);
+    assert_int_equal(s.role, GN_RT_VIRTUAL);
+    assert_float_equal(s.point[2], 2.0f, 1e-6);
+    assert_float_equal(s.albedo[0], 0.75f, 0.0); // the mesh's own
+    assert_float_equal(look_down(scene, 10.1f, 0.2f).albedo[2], 0.125f, 0.0);
+    s = look_down(scene, 15.1f, 0.2f);
+    assert_int_equal(s.material, GN_MATERIAL_DIFFUSE);
+    assert_float_equal(s.albedo[1], 0.2f, 1e-7); // the manifest's
+    s = look_down(scene, 20.1f, 0.2f);
+    assert_int_equal(s.material, GN_MATERIAL_MIRROR);
+    assert_float_equal(s.albedo[0], 1.0f, 0.0);
+    gn_scene_destroy(&scene);
+    assert_null(scene);
+}
+
+static void test_manifest_errors_say_where(void **state)
+{
+    (void)state;
+#define OBJECT "{\"mesh\":\"a.obj\",\"role\":\"real\""
+    const struct {
+        const char *json;
+        const char *says[2];
+    } cases[] = {
+        {"", {"scene.json", ""}},
+        {"[]", {"scene.json", ""}},
+        {"{}", {"objects", ""}},
+        {"{\"objects\":[]}", {"objects", "1"}},
+        {"{\"objects\":[7]}", {"objects[0]", "object"}},
+        {"{\"objects\":[{\"role\":\"real\"}]}", {"objects[0]", "mesh"}},
+        {"{\"objects\":[{\"mesh\":\"a.obj\"}]}", {"objects[0]", "role"}},
+        {"{\"objects\":[{\"mesh\":\"a.obj\",\"role\":\"ghost\"}]}", {"role", "virtual"}},
+        {"{\"objects\":[{\"mesh\":\"no.obj\",\"role\":\"real\"}]}", {"objects[0].mesh", "/no.obj"}},
+        {"{\"objects\":[{\"mesh\":\"\",\"role\":\"real\"}]}", {"objects[0].mesh", ""}},
+        {"{\"objects\":[" OBJECT ",\"colour\":1}]}", {"objects[0]", "colour"}},
+        {"{\"objects\":[" OBJECT ",\"name\":\"\"}]}", {"objects[0].name", "1 to 255"}},
+        {"{\"objects\":[" OBJECT "}],\"light\":[]}", {"light", ""}},
+        {"{\"objects\":[" OBJECT "}],\"lights\":[{}]}", {"lights", "not built yet"}},
+        {"{\"objects\":[" OBJECT "}],\"lights\":3}", {"lights", "array"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{}}]}", {"objects[0].material", "type"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"glass\"}}]}",
+         {"objects[0].material.type", "diffuse and mirror are"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"ggx\",\"roughness\":0.1}}]}",
+         {"objects[0].material.type", "not built yet"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"wood\"}}]}", {"type", "mirror"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"diffuse\",\"ior\":1.5}}]}",
+         {"objects[0].material.ior", "a diffuse material has none"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"diffuse\",\"albedo\":[0,0,1.5]}}]}",
+         {"objects[0].material.albedo", "[0, 1]"}},
+        {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"diffuse\",\"albedo\":[0,0]}}]}",
+         {"objects[0].material.albedo", "3"}},
+        {"{\"objects\":[" OBJECT ",\"world_from_object\":[1,0,0,0, 0,0,0,0, 0,0,1,0, 0,0,0,1]}]}",
+         {"objects[0].world_from_object", "singular"}},
+        {"{\"objects\":[" OBJECT ",\"world_from_object\":[1,0,0,0, 0,1,0,0, 0,0,1,0, 1,0,0,1]}]}",
+         {"objects[0].world_from_object", "row-major"}},
+        {"{\"objects\":[" OBJECT ",\"world_from_object\":[1,2,3]}]}",
+         {"objects[0].world_from_object", "16"}},
+        {"{\"objects\":[" OBJECT ",\"world_from_object\":[1,0,0,9e20, 0,1,0,0, 0,0,1,0, "
+         "0,0,0,1]}]}",
+         {"scene.json", "at most"}},
+    };
+    for (size_t i = 0; i < LENGTH(cases); i++) {
+        struct gn_scene *scene = NULL;
+        struct gn_error error;
+        int ret = read_scene(cases[i].json, &scene, &error);
+        bool says = strstr(error.text, cases[i].says[0]) && strstr(error.text, cases[i].says[1]) &&
+                    strstr(error.text, manifest) && !strchr(error.text, '\n');
+        if (ret == 0 || !says)
+            print_message("# %s: %d %s\n", cases[i].json, ret, error.text);
+        assert_true(ret < 0);
+        assert_true(says);
+        assert_null(scene);
+    }
+#undef OBJECT
+}
+
+static void test_create_takes_all_or_nothing(void **state)
+{
+    (void)state;
+    struct gn_scene_object objects[2] = {
+        {.name = strdup("ball"), .role = GN_RT_VIRTUAL, .mesh = gn_test_make_sphere(1.0f, 8)},
+        {.name = strdup("bad"), .role = GN_RT_REAL, .mesh = gn_test_make_cube(1.0f)},
+    };
+    gn_mat4_identity(objects[0].world_from_object);
+    gn_mat4_identity(objects[1].world_from_object);
+    objects[1].world_from_object[0] = 0.0; // singular
+    struct gn_scene *scene = NULL;
+    struct gn_error error = {0};
+    assert_int_equal(gn_scene_create(objects, 2, NULL, &scene, &error), -EINVAL);
+    assert_non_null(strstr(error.text, "object 1 (bad)"));
+    assert_null(scene);
+    assert_string_equal(objects[0].name, "ball"); // still ours
+    objects[1].world_from_object[0] = 1.0;
+    assert_int_equal(gn_scene_create(objects, 2, NULL, &scene, &error), 0);
+    assert_null(objects[0].name);
+    assert_null(objects[1].mesh.positions);
+    gn_scene_destroy(&scene);
+    assert_int_equal(gn_scene_create(objects, 0, NULL, &scene, &error), -EINVAL);
+}
+
+static void test_normals_face_the_ray_and_turn_with_the_object(void **state)
+{
+    (void)state;
+    // An ellipsoid by an uneven, mirroring scale: normals go by the inverse transpose.
+    struct gn_scene_object object = {.role = GN_RT_VIRTUAL, .mesh = gn_test_make_sphere(1.0f, 64)};
+    const double m[16] = {-2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1};
+    memcpy(object.world_from_object, m, sizeof(m));
+    struct gn_scene *scene = NULL;
+    assert_int_equal(gn_scene_create(&object, 1, NULL, &scene, NULL), 0);
+    uint64_t seed = 9;
+    for (int i = 0; i < 1000; i++) {
+        float dir[3];
+        gn_test_random_direction(&seed, dir);
+        const float inside[3] = {0};
+        float outside[3];
+        float back[3];
+        for (int k = 0; k < 3; k++) {
+            outside[k] = 5.0f * dir[k];
+            back[k] = -dir[k];
+        }
+        struct gn_rt_hit hit;
+        struct gn_surface s;
+        assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, outside, back, 0.0f, INFINITY, &hit));
+        gn_scene_get_surface(scene, back, &hit, &s);
+        const double gradient[3] = {s.point[0] / 4.0, s.point[1], s.point[2] * 4.0};
+        double length =
+            sqrt(gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]);
+        for (int k = 0; k < 3; k++) // the ellipsoid's own normal, within a facet's error
+            assert_float_equal(s.normal_shading[k], gradient[k] / length, 6e-3);
+        double facing = 0.0;
+        for (int k = 0; k < 3; k++)
+            facing += (double)s.normal_geometric[k] * back[k];
+        assert_true(facing <= 0.0);
+        // From inside both turn round.
+        assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, inside, dir, 0.0f, INFINITY, &hit));
+        gn_scene_get_surface(scene, dir, &hit, &s);
+        facing = 0.0;
+        double same = 0.0;
+        for (int k = 0; k < 3; k++) {
+            facing += (double)s.normal_geometric[k] * dir[k];
+            same += (double)s.normal_geometric[k] * s.normal_shading[k];
+        }
+        assert_true(facing < 0.0);
+        assert_true(same > 0.99);
+    }
+    gn_scene_destroy(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_manifest_is_read),
+        cmocka_unit_test(test_manifest_errors_say_where),
+        cmocka_unit_test(test_create_takes_all_or_nothing),
+        cmocka_unit_test(test_normals_face_the_ray_and_turn_with_the_object),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
