@@ -4,6 +4,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 #include <unistd.h>
 
 #define DEFAULT_QUEUED_BYTES ((size_t)96 << 20)
-// A power of two. Far more than the frames outstanding of any session, few enough to bound the
+// Far more than the frames outstanding of any session, few enough to bound the
 // heads' memory.
 #define QUEUE_SLOTS 64
 #define WRITE_PARTS 16
@@ -128,56 +129,63 @@ void gn_conn_set_max_payload(struct gn_conn *conn, uint32_t bytes)
     conn->max_payload = bytes;
 }
 
-/** Keep the reason, once and for all. */
-static int stop_reading(struct gn_conn *conn, int err)
+/** Keep the error and its sentence, once and for all. Returns err. */
+GN_PRINTF(3, 4)
+static int stop_reading(struct gn_conn *conn, int err, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(conn->fault.text, sizeof(conn->fault.text), format, args);
+    va_end(args);
+    conn->read_err = err;
+    return err;
+}
+
+static int stop_out_of_memory(struct gn_conn *conn)
+{
+    return stop_reading(conn, -ENOMEM, "cannot read: out of memory");
+}
+
+/** The envelope is not one that may come: say why. */
+static int refuse_envelope(struct gn_conn *conn, int err)
 {
     const struct gn_envelope *e = &conn->envelope;
-    char *text = conn->fault.text;
-    size_t cap = sizeof(conn->fault.text);
     const struct gn_wire_info *info = gn_wire_get_info(e->type);
     const char *name = info ? info->name : "?";
-    conn->read_err = err;
     if (err == -EBADMSG)
-        snprintf(text, cap, "not this protocol: a message starts with the bytes GNOM");
-    else if (err == -EPROTONOSUPPORT)
-        snprintf(text, cap, "protocol version %u, this side speaks %d to %d", e->version,
-                 GN_PROTO_VERSION_MIN, GN_PROTO_VERSION_MAX);
-    else if (err == -EPROTO)
-        snprintf(text, cap, "%s: flags %u and stream %u, must be 0", name, e->flags, e->stream);
-    else if (err == -ENOMSG)
-        snprintf(text, cap, "no message has type %u", e->type);
-    else if (err == -EOPNOTSUPP)
-        snprintf(text, cap, "%s: this side does not receive such messages", name);
-    else if (err == -EMSGSIZE)
-        snprintf(text, cap, "%s: header of %u and payload of %u bytes, at most %u and %u here",
-                 name, e->header_bytes, e->payload_bytes, info->max_header_bytes,
-                 info->max_payload_bytes < conn->max_payload ? info->max_payload_bytes
-                                                             : conn->max_payload);
-    else if (err == -ENODATA)
-        snprintf(text, cap, "the peer closed the connection");
-    else if (err == -ECONNRESET && conn->have + (size_t)conn->stage > 0)
-        snprintf(text, cap, "the peer closed the connection in the middle of a message");
-    else
-        snprintf(text, cap, "cannot read: %s", strerror(-err));
-    return err;
+        return stop_reading(conn, err, "not this protocol: a message starts with the bytes GNOM");
+    if (err == -EPROTONOSUPPORT)
+        return stop_reading(conn, err, "protocol version %u, this side speaks %d to %d", e->version,
+                            GN_PROTO_VERSION_MIN, GN_PROTO_VERSION_MAX);
+    if (err == -EPROTO)
+        return stop_reading(conn, err, "%s: flags %u and stream %u, must be 0", name, e->flags,
+                            e->stream);
+    if (!info)
+        return stop_reading(conn, err, "no message has type %u", e->type);
+    if (err == -EOPNOTSUPP)
+        return stop_reading(conn, err, "%s: this side does not receive such messages", name);
+    return stop_reading(
+        conn, err, "%s: header of %u and payload of %u bytes, at most %u and %u here", name,
+        e->header_bytes, e->payload_bytes, info->max_header_bytes,
+        info->max_payload_bytes < conn->max_payload ? info->max_payload_bytes : conn->max_payload);
 }
 
 /** After the 20 bytes: check them, and only then take memory. */
 static int begin_message(struct gn_conn *conn)
 {
     memset(&conn->envelope, 0, sizeof(conn->envelope));
-    int err = gn_envelope_decode(conn->envelope_bytes, &conn->envelope);
-    if (err)
-        return err;
     const struct gn_envelope *e = &conn->envelope;
-    if (!(gn_wire_get_info(e->type)->direction & conn->receive))
-        return -EOPNOTSUPP;
-    if (e->payload_bytes > conn->max_payload)
-        return -EMSGSIZE;
+    int err = gn_envelope_decode(conn->envelope_bytes, &conn->envelope);
+    if (!err && !(gn_wire_get_info(e->type)->direction & conn->receive))
+        err = -EOPNOTSUPP;
+    if (!err && e->payload_bytes > conn->max_payload)
+        err = -EMSGSIZE;
+    if (err)
+        return refuse_envelope(conn, err);
     if (e->header_bytes > conn->header_cap) {
         uint8_t *header = realloc(conn->header, e->header_bytes);
         if (!header)
-            return -ENOMEM;
+            return stop_out_of_memory(conn);
         conn->header = header;
         conn->header_cap = e->header_bytes;
     }
@@ -201,8 +209,8 @@ static uint8_t *get_target(struct gn_conn *conn, size_t *out_bytes)
     return conn->envelope_bytes;
 }
 
-/** The present stage is full: go to the next. Returns 1 where that ends the message, 0, or a
- * negative errno. */
+/** The present stage is full: go to the next. Returns 1 where that ends the message, 0, or what
+ * stop_reading() returned. */
 static int end_stage(struct gn_conn *conn)
 {
     conn->have = 0;
@@ -215,9 +223,8 @@ static int end_stage(struct gn_conn *conn)
             return 0;
     }
     if (conn->stage == STAGE_HEADER && conn->envelope.payload_bytes > 0) {
-        int err = gn_buf_create(conn->envelope.payload_bytes, &conn->payload);
-        if (err)
-            return err;
+        if (gn_buf_create(conn->envelope.payload_bytes, &conn->payload))
+            return stop_out_of_memory(conn);
         conn->stage = STAGE_PAYLOAD;
         return 0;
     }
@@ -237,17 +244,19 @@ int gn_conn_read(struct gn_conn *conn, struct gn_conn_message *out_message)
         if (n == -EAGAIN)
             return 0;
         if (n < 0)
-            return stop_reading(conn, (int)n);
+            return stop_reading(conn, (int)n, "cannot read: %s", strerror((int)-n));
+        if (n == 0 && conn->stage == STAGE_ENVELOPE && conn->have == 0)
+            return stop_reading(conn, -ENODATA, "the peer closed the connection");
         if (n == 0)
-            return stop_reading(
-                conn, conn->stage == STAGE_ENVELOPE && conn->have == 0 ? -ENODATA : -ECONNRESET);
+            return stop_reading(conn, -ECONNRESET,
+                                "the peer closed the connection in the middle of a message");
         conn->have += (size_t)n;
         budget -= (size_t)n;
         if (conn->have < want)
             continue;
         int end = end_stage(conn);
         if (end < 0)
-            return stop_reading(conn, end);
+            return end;
         if (end == 0)
             continue;
         out_message->envelope = conn->envelope;
@@ -285,10 +294,9 @@ int gn_conn_send(struct gn_conn *conn, uint16_t type, const void *msg, struct gn
     size_t payload_len = payload ? payload->len : 0;
     if (conn->is_torn)
         return -EPIPE;
-    if (payload_len > UINT32_MAX)
-        return -EMSGSIZE;
-    int err =
-        gn_wire_encode(type, msg, (uint32_t)payload_len, head, sizeof(head), &head_len, out_fault);
+    // No type's limit is as high: gn_wire_encode() refuses it in words.
+    uint32_t payload_bytes = payload_len < UINT32_MAX ? (uint32_t)payload_len : UINT32_MAX;
+    int err = gn_wire_encode(type, msg, payload_bytes, head, sizeof(head), &head_len, out_fault);
     if (err)
         return err;
     size_t bytes = head_len + payload_len;

@@ -28,8 +28,8 @@ struct gn_conn_io {
 };
 
 struct gn_conn_options {
-    enum gn_wire_direction
-        receive; // what may arrive: TO_SERVER in a server, TO_CLIENT in a client; no default
+    // What may arrive: TO_SERVER in a server, TO_CLIENT in a client; no default.
+    enum gn_wire_direction receive;
     size_t max_queued_bytes;     // bound on what waits to be written, default 96 MiB
     const struct gn_conn_io *io; // borrowed until destroy; NULL: fd is a plain socket
     void *io_ctx;                // for io
@@ -39,10 +39,10 @@ struct gn_conn_options {
 /** A message as it came. */
 struct gn_conn_message {
     struct gn_envelope envelope;
-    const uint8_t
-        *header; // envelope.header_bytes long; borrowed until the next call with this connection
-    struct gn_buf
-        *payload; // envelope.payload_bytes long; NULL where that is 0; the caller's reference
+    // envelope.header_bytes long; borrowed until the next call with this connection
+    const uint8_t *header;
+    // envelope.payload_bytes long; NULL where that is 0; the caller's reference
+    struct gn_buf *payload;
 };
 
 /** Thread-safety: owner thread. */
@@ -72,10 +72,10 @@ void gn_conn_set_max_payload(struct gn_conn *conn, uint32_t bytes);
  * Returns 1 and out_message: a message; its payload is the caller's to unref.
  * Returns 0: none yet (poll again; level-triggered in an event loop).
  * Returns a negative errno: the connection can be read no more, and every later call returns the
- * same: -ENODATA the peer closed between messages; -ECONNRESET in the middle of one; -EPROTO also
- * for a message that goes the other way; the others of gn_envelope_decode(); -ENOMEM; or the
- * stream's own. gn_conn_get_fault() then has the sentence and gn_wire_get_error_code() the code for
- * an ERROR.
+ * same: -ENODATA the peer closed between messages; -ECONNRESET in the middle of one; -EOPNOTSUPP a
+ * message that goes the other way; those of gn_envelope_decode(), -EMSGSIZE also for a payload over
+ * gn_conn_set_max_payload(); -ENOMEM; or the stream's own. gn_conn_get_fault() then has the
+ * sentence and gn_wire_get_error_code() the code for an ERROR.
  */
 GN_MUST_USE int gn_conn_read(struct gn_conn *conn, struct gn_conn_message *out_message);
 

@@ -258,6 +258,10 @@ static void test_queue_is_bounded(void **state)
     assert_non_null(strstr(fault.text, "wait"));
     assert_int_equal(gn_conn_get_queued_bytes(conn), queued);
     assert_int_equal(gn_conn_get_queued_messages(conn), 1);
+    struct gn_buf vast; // its bytes are never looked at
+    gn_buf_init(&vast, payload->data, (size_t)UINT32_MAX + 2, count_release, NULL);
+    assert_int_equal(gn_conn_send(conn, GN_WIRE_FRAME, &m, &vast, &fault), -EMSGSIZE);
+    assert_non_null(strstr(fault.text, "at most 33554432"));
     gn_buf_unref(&payload);
     assert_int_equal(created_bytes, 600);
     gn_conn_destroy(&conn); // gives back what is queued
@@ -339,6 +343,38 @@ static void test_peer_gone_while_writing(void **state)
     gn_conn_destroy(&conn);
 }
 
+/** What a stream says of itself, TLS for one, may be any errno: also those of bad envelopes. */
+static ssize_t failing_read(void *ctx, void *buf, size_t len)
+{
+    (void)buf;
+    (void)len;
+    return *(const int *)ctx;
+}
+
+static void nothing_to_close(void *ctx)
+{
+    (void)ctx;
+}
+
+static void test_errors_of_the_stream(void **state)
+{
+    (void)state;
+    const struct gn_conn_io table = {.read = failing_read, .close = nothing_to_close};
+    int errors[] = {-EMSGSIZE, -EPROTO, -EBADMSG, -EOPNOTSUPP, -ECONNRESET, -EIO};
+    for (size_t i = 0; i < GN_ARRAY_LEN(errors); i++) {
+        struct gn_conn_options opts = {
+            .receive = GN_WIRE_TO_SERVER, .io = &table, .io_ctx = &errors[i]};
+        struct gn_conn *conn;
+        struct gn_conn_message message;
+        char want[96];
+        snprintf(want, sizeof(want), "cannot read: %s", strerror(-errors[i]));
+        assert_int_equal(gn_conn_create(&opts, &conn), 0);
+        assert_int_equal(gn_conn_read(conn, &message), errors[i]);
+        assert_string_equal(gn_conn_get_fault(conn), want);
+        gn_conn_destroy(&conn);
+    }
+}
+
 struct counting_io {
     size_t given; // bytes asked of us so far
     size_t largest;
@@ -405,6 +441,7 @@ int main(void)
         cmocka_unit_test(test_queue_is_bounded),
         cmocka_unit_test(test_partial_writes),
         cmocka_unit_test(test_peer_gone_while_writing),
+        cmocka_unit_test(test_errors_of_the_stream),
         cmocka_unit_test(test_another_io_and_a_turns_share),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
