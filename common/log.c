@@ -78,7 +78,7 @@ static struct {
 
 static struct gn_log_topic own_topic = {.name = "log"};
 
-/* Writes the line, all of it or none: a log that cannot be written is not worth dying for. */
+/* Writes the line as far as it goes: a log that cannot be written is not worth dying for. */
 static void write_line(const struct line *line)
 {
     char buffer[LINE_BYTES + 128];
@@ -277,7 +277,8 @@ static void run_log_thread(void *context)
     while (!atomic_load_explicit(&state.is_stopping, memory_order_acquire)) {
         while (sem_wait(&state.wake) != 0 && errno == EINTR)
             ;
-        atomic_store(&state.is_woken, false);
+        // An exchange, not a store: it reads what the wakers wrote, and so sees their lines.
+        (void)atomic_exchange(&state.is_woken, false);
         drain();
     }
 }
