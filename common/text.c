@@ -5,43 +5,18 @@
 #include <ctype.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-/* Bytes of the UTF-8 sequence at s, or 0 where it is not one (overlong, surrogate, > U+10FFFF). */
-static int utf8_length(const unsigned char *s)
-{
-    static const uint32_t least[5] = {0, 0, 0x80, 0x800, 0x10000};
-    int n = s[0] < 0x80             ? 1
-            : (s[0] & 0xe0) == 0xc0 ? 2
-            : (s[0] & 0xf0) == 0xe0 ? 3
-            : (s[0] & 0xf8) == 0xf0 ? 4
-                                    : 0;
-    if (n <= 1)
-        return n;
-    uint32_t code = s[0] & (0x7fu >> n);
-    for (int i = 1; i < n; i++) {
-        if ((s[i] & 0xc0) != 0x80)
-            return 0;
-        code = code << 6 | (s[i] & 0x3fu);
-    }
-    if (code < least[n] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000))
-        return 0;
-    return n;
-}
+#include "proto/utf8.h"
 
 void gn_text_clean(char *text)
 {
-    unsigned char *s = (unsigned char *)text;
-    while (*s != '\0') {
-        int n = utf8_length(s);
-        /* U+0080 to U+009F are control characters too, two bytes long. */
-        bool is_control = n == 1 ? *s < 0x20 || *s == 0x7f : n == 2 && *s == 0xc2 && s[1] < 0xa0;
+    while (*text != '\0') {
+        size_t n = gn_utf8_get_character_bytes(text);
         if (n == 0)
-            *s = '?';
-        else if (is_control)
-            memset(s, '?', (size_t)n);
-        s += n == 0 ? 1 : n;
+            *text++ = '?';
+        else
+            text += n;
     }
 }
 

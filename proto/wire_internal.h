@@ -23,8 +23,4 @@ int gn_wire_check(uint16_t type, const void *msg, uint32_t payload_bytes,
 /** Fill in the defaults of a message that gn_wire_check() has passed. */
 void gn_wire_set_defaults(uint16_t type, void *msg);
 
-/** Bytes of the well-formed UTF-8 character (RFC 3629) that text starts with, 0 where it is none or
- * a control character. */
-size_t gn_wire_get_character_bytes(const char *text);
-
 #endif

@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <string.h>
 
-#include "proto/wire_internal.h"
+#include "proto/utf8.h"
 
 const char *gn_wire_get_error_text(enum gn_msg_error_code code)
 {
@@ -106,31 +106,11 @@ enum gn_msg_error_code gn_wire_get_error_code(int err)
     }
 }
 
-// Well-formed sequences: RFC 3629, section 4. Control characters: U+0000 to U+001F, U+007F to
-// U+009F.
-size_t gn_wire_get_character_bytes(const char *text)
-{
-    const unsigned char *s = (const unsigned char *)text;
-    if (s[0] < 0x80)
-        return s[0] >= 0x20 && s[0] != 0x7f ? 1 : 0;
-    size_t n = s[0] >= 0xf0 ? 4 : s[0] >= 0xe0 ? 3 : 2;
-    if (s[0] < 0xc2 || s[0] > 0xf4)
-        return 0;
-    for (size_t i = 1; i < n; i++)
-        if ((s[i] & 0xc0) != 0x80)
-            return 0; // also at the string's end
-    if ((s[0] == 0xc2 && s[1] < 0xa0) || (s[0] == 0xe0 && s[1] < 0xa0) ||
-        (s[0] == 0xed && s[1] > 0x9f) || (s[0] == 0xf0 && s[1] < 0x90) ||
-        (s[0] == 0xf4 && s[1] > 0x8f))
-        return 0;
-    return n;
-}
-
 void gn_wire_set_string(char *out, size_t cap, const char *text)
 {
     size_t used = 0;
     while (*text) {
-        size_t n = gn_wire_get_character_bytes(text);
+        size_t n = gn_utf8_get_character_bytes(text);
         if (used + (n ? n : 1) >= cap)
             break;
         if (n == 0) {

@@ -11,6 +11,7 @@
 
 #include <pb_common.h>
 
+#include "proto/utf8.h"
 #include "proto/wire_internal.h"
 
 struct field {
@@ -145,7 +146,7 @@ static int check_string(const char *text, size_t cap, const char *path, struct g
     if (!memchr(text, 0, cap))
         return gn_wire_refuse(fault, "%s: longer than %zu bytes", path, cap - 1);
     for (size_t i = 0; text[i];) {
-        size_t n = gn_wire_get_character_bytes(text + i);
+        size_t n = gn_utf8_get_character_bytes(text + i);
         if (n == 0)
             return gn_wire_refuse(fault, "%s: byte %zu is a control character or not UTF-8", path,
                                   i);
