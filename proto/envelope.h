@@ -1,9 +1,8 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * The 20 bytes before every message. All little-endian:
- *   0 magic 'G' 'N' 'O' 'M' | 4 version u8 | 5 flags u8 | 6 type u16 | 8 stream u32 | 12 header
- * length u32 | 16 payload length u32 Pure: no memory, no I/O.
+ * The 20 bytes before every message, little-endian: magic "GNOM", then the fields of struct
+ * gn_envelope in their order and size, without padding. Pure: no memory, no I/O.
  */
 #ifndef GN_PROTO_ENVELOPE_H
 #define GN_PROTO_ENVELOPE_H

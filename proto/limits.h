@@ -12,7 +12,7 @@
 #define GN_PROTO_VERSION_MAX 1
 #define GN_PROTO_PORT 7340
 
-/** Bytes: no header of any type is longer, whatever wire.c's table says for that type. */
+/** Bytes: longest header of any type. */
 #define GN_LIMIT_HEADER_BYTES 16384
 /** Bytes: longest payloads. */
 #define GN_LIMIT_ENVIRONMENT_BYTES (64u << 20)
@@ -22,8 +22,7 @@
 
 /** Pixels: longest side of any picture or environment frame. A server may grant less in WELCOME. */
 #define GN_LIMIT_SIDE_PX 8192
-/** Lighting states: lights, bytes of one light's record in the payload, longest sides of the map.
- */
+/** Lighting states: lights, bytes of a light's record in the payload, longest sides of the map. */
 #define GN_LIMIT_LIGHTS 16384
 #define GN_LIGHT_RECORD_BYTES 32
 #define GN_LIMIT_MAP_WIDTH_PX 2048

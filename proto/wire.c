@@ -13,36 +13,36 @@
 
 #include "proto/wire_internal.h"
 
-// A peer's encoder may write longer headers than ours: other orders, unpacked arrays, fields of
-// later versions.
+// X(NAME, name, who sends, header at most, payload at most). A peer's encoder may write longer
+// headers than ours: other orders, unpacked arrays, fields of later versions.
+#define TYPES(X)                                                                                   \
+    X(HELLO, hello, TO_SERVER, 2048, 0)                                                            \
+    X(WELCOME, welcome, TO_CLIENT, 1024, 0)                                                        \
+    X(REDIRECT, redirect, TO_CLIENT, 1024, 0)                                                      \
+    X(ERROR, error, BOTH_WAYS, 2048, 0)                                                            \
+    X(BYE, bye, BOTH_WAYS, 1024, 0)                                                                \
+    X(PING, ping, BOTH_WAYS, 256, 0)                                                               \
+    X(PONG, pong, BOTH_WAYS, 256, 0)                                                               \
+    X(ENVIRONMENT_FRAME, environment_frame, TO_SERVER, 2048, GN_LIMIT_ENVIRONMENT_BYTES)           \
+    X(POSE, pose, TO_SERVER, 1024, 0)                                                              \
+    X(CAMERA, camera, TO_SERVER, 1024, 0)                                                          \
+    X(FRAME, frame, TO_SERVER, 4096, GN_LIMIT_FRAME_BYTES)                                         \
+    X(RESULT, result, TO_CLIENT, GN_LIMIT_HEADER_BYTES, GN_LIMIT_RESULT_BYTES)                     \
+    X(DROPPED, dropped, TO_CLIENT, 1024, 0)                                                        \
+    X(LIGHTING_STATE, lighting_state, TO_CLIENT, 2048, GN_LIMIT_LIGHTING_BYTES)                    \
+    X(STATISTICS, statistics, TO_CLIENT, 1024, 0)
+
 #define ROW(NAME, name, way, max_header, max_payload)                                              \
-    {                                                                                              \
-        GN_WIRE_##NAME, GN_WIRE_##way, #NAME, GN_MSG_##NAME##_FIELDS,                              \
-            sizeof(struct gn_msg_##name), max_header, max_payload                                  \
-    }
+    {GN_WIRE_##NAME, GN_WIRE_##way, #NAME, GN_MSG_##NAME##_FIELDS, sizeof(struct gn_msg_##name),   \
+     max_header,     max_payload},
+static const struct gn_wire_info table[] = {TYPES(ROW)};
 
-static const struct gn_wire_info table[] = {
-    ROW(HELLO, hello, TO_SERVER, 2048, 0),
-    ROW(WELCOME, welcome, TO_CLIENT, 1024, 0),
-    ROW(REDIRECT, redirect, TO_CLIENT, 1024, 0),
-    ROW(ERROR, error, BOTH_WAYS, 2048, 0),
-    ROW(BYE, bye, BOTH_WAYS, 1024, 0),
-    ROW(PING, ping, BOTH_WAYS, 256, 0),
-    ROW(PONG, pong, BOTH_WAYS, 256, 0),
-    ROW(ENVIRONMENT_FRAME, environment_frame, TO_SERVER, 2048, GN_LIMIT_ENVIRONMENT_BYTES),
-    ROW(POSE, pose, TO_SERVER, 1024, 0),
-    ROW(CAMERA, camera, TO_SERVER, 1024, 0),
-    ROW(FRAME, frame, TO_SERVER, 4096, GN_LIMIT_FRAME_BYTES),
-    ROW(RESULT, result, TO_CLIENT, GN_LIMIT_HEADER_BYTES, GN_LIMIT_RESULT_BYTES),
-    ROW(DROPPED, dropped, TO_CLIENT, 1024, 0),
-    ROW(LIGHTING_STATE, lighting_state, TO_CLIENT, 2048, GN_LIMIT_LIGHTING_BYTES),
-    ROW(STATISTICS, statistics, TO_CLIENT, 1024, 0),
-};
-
-static_assert(GN_ENVELOPE_BYTES + GN_MSG_RESULT_SIZE <= GN_WIRE_HEAD_BYTES,
-              "RESULT is the longest message");
-static_assert(GN_MSG_HELLO_SIZE <= 2048 && GN_MSG_ERROR_SIZE <= 2048 && GN_MSG_FRAME_SIZE <= 4096,
-              "what we write is within what we take");
+// What we write is within what we take, and fits in the space that wire.h promises.
+#define FITS(NAME, name, way, max_header, max_payload)                                             \
+    static_assert(GN_MSG_##NAME##_SIZE <= (max_header) && (max_header) <= GN_LIMIT_HEADER_BYTES && \
+                      GN_ENVELOPE_BYTES + GN_MSG_##NAME##_SIZE <= GN_WIRE_HEAD_BYTES,              \
+                  #NAME);
+TYPES(FITS)
 
 const struct gn_wire_info *gn_wire_get_row(size_t i)
 {

@@ -73,14 +73,12 @@ union gn_wire_message {
     struct gn_msg_statistics statistics;
 };
 
-/** Why a message was refused: one line that names message and field, fit for an ERROR's sentence.
- */
+/** Why a message was refused: one line with message and field, fit for an ERROR's sentence. */
 struct gn_wire_fault {
     char text[192];
 };
 
-/** Longest envelope and header that we ever write (other encoders may write longer ones, up to the
- * limits). */
+/** Longest envelope and header that we write; other encoders may write more, up to the limits. */
 #define GN_WIRE_HEAD_BYTES 3072
 
 /** The row of a type, or NULL where there is no such type. Thread-safety: safe. */
