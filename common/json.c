@@ -203,8 +203,8 @@ int gn_json_get_double(const struct gn_json *object, const char *key, double min
         return refuse_type(object, key, "a number", value, out_error);
     double number = json_number_value(value);
     if (!isfinite(number) || !(number >= min && number <= max))
-        return gn_json_refuse(object, key, out_error, "expected a number in [%g, %g], found %g",
-                              min, max, number);
+        return gn_json_refuse(object, key, out_error,
+                              "expected a number in [%.10g, %.10g], found %.10g", min, max, number);
     *out_value = number;
     return 0;
 }
@@ -220,7 +220,7 @@ int gn_json_get_int(const struct gn_json *object, const char *key, int min, int 
     double number = json_number_value(value);
     if (!(number >= min && number <= max) || number != floor(number))
         return gn_json_refuse(object, key, out_error,
-                              "expected a whole number in [%d, %d], found %g", min, max, number);
+                              "expected a whole number in [%d, %d], found %.10g", min, max, number);
     *out_value = (int)number;
     return 0;
 }

@@ -11,8 +11,8 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Of a theta_max: the decimal digits a file or a float32 on the wire gives pi with. */
-static const double pi_slack = 1e-6;
+/* Of a theta_max. */
+static const double pi_slack = GN_PROJECTION_MAX_THETA - 3.14159265358979323846;
 
 static const char *const names[GN_PROJECTION_COUNT] = {
     [GN_PROJECTION_LATLONG] = "latlong",
@@ -156,7 +156,7 @@ static const char *check_radial(struct gn_projection *p)
     bool is_whole = p->type == GN_PROJECTION_ANGULAR || p->type == GN_PROJECTION_MIRRORBALL;
     if (p->theta_max == 0)
         p->theta_max = is_whole ? pi : 0.5 * pi;
-    if (!(p->theta_max > 0 && p->theta_max <= pi + pi_slack))
+    if (!(p->theta_max > 0 && p->theta_max <= GN_PROJECTION_MAX_THETA))
         return "theta_max must lie in (0, pi]";
     p->theta_max = fmin(p->theta_max, pi);
     if (p->type == GN_PROJECTION_FISHEYE_ORTHOGRAPHIC) {

@@ -17,6 +17,10 @@
 
 #include "proto/attr.h"
 
+/** rad: pi and what a float32 or a file's seven digits add to it; gn_projection_init cuts that off.
+ */
+#define GN_PROJECTION_MAX_THETA 3.1415936535897932
+
 enum gn_projection_type {
     GN_PROJECTION_LATLONG = 0,
     GN_PROJECTION_ANGULAR = 1,                // Debevec's light probe: theta = pi r

@@ -12,6 +12,8 @@
 #define MAX_COORDINATE_PX 1e6
 #define MAX_COEFFICIENT 1e6
 #define MAX_SCALE 1e12
+// rad: what a float32 of pi has more than pi, and more. Readers cut it off.
+#define THETA_SLACK 1e-6
 
 static int check_transform(const struct gn_msg_transform *t, const char *path,
                            struct gn_wire_fault *fault)
@@ -79,7 +81,7 @@ static int check_projection(const struct gn_msg_projection *p, struct gn_wire_fa
         return gn_wire_refuse(fault, "%s: radius_px %g, focal_px %g, must be in [0, 1e6]", path,
                               p->radius_px, p->focal_px);
     double max = p->type == GN_MSG_PROJECTION_TYPE_ORTHOGRAPHIC ? PI / 2 : PI;
-    if (p->theta_max < 0 || p->theta_max > max + 1e-9)
+    if (p->theta_max < 0 || p->theta_max > max + THETA_SLACK)
         return gn_wire_refuse(fault, "%s.theta_max: %g rad, must be in [0, %g]", path, p->theta_max,
                               max);
     bool is_kannala_brandt = p->type == GN_MSG_PROJECTION_TYPE_KANNALA_BRANDT;

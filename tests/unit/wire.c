@@ -374,6 +374,18 @@ static void test_defaults(void **state)
     assert_false(out.frame.views[0].has_world_from_camera);
 }
 
+/** A client that computes in float32 means pi by a little more than pi. */
+static void test_theta_max_of_a_float(void **state)
+{
+    (void)state;
+    union gn_wire_message m;
+    uint32_t payload = sample_message(GN_WIRE_ENVIRONMENT_FRAME, &m);
+    m.environment_frame.projection.theta_max = (double)3.14159265358979f;
+    expect(GN_WIRE_ENVIRONMENT_FRAME, &m, payload, 0, "");
+    m.environment_frame.projection.theta_max = 3.1416;
+    expect(GN_WIRE_ENVIRONMENT_FRAME, &m, payload, -EDOM, "theta_max");
+}
+
 static void test_envelope(void **state)
 {
     (void)state;
@@ -532,6 +544,7 @@ int main(void)
         cmocka_unit_test(test_values_out_of_range),
         cmocka_unit_test(test_bad_structs_are_not_encoded),
         cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_theta_max_of_a_float),
         cmocka_unit_test(test_envelope),
         cmocka_unit_test(test_limits_hold_at_the_byte),
         cmocka_unit_test(test_set_string),
