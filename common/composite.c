@@ -123,9 +123,9 @@ static bool are_layers_ok(const struct gn_composite_layers *layers, int width, i
            (!layers->added || has_shape(layers->added, width, height, 3));
 }
 
-int gn_composite_srgb8(const struct gn_composite_layers *layers, const struct gn_image8 *background,
-                       const struct gn_response *response, bool encoded_multiply,
-                       struct gn_pool *pool, struct gn_image8 *out)
+int gn_composite_image8(const struct gn_composite_layers *layers,
+                        const struct gn_image8 *background, const struct gn_response *response,
+                        bool encoded_multiply, struct gn_pool *pool, struct gn_image8 *out)
 {
     int width = background->width, height = background->height;
     if (!background->data || background->channels != 3 || !out->data || out->channels != 3 ||

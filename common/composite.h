@@ -30,10 +30,10 @@ struct gn_composite_layers {
  * Returns 0 or -EINVAL where sizes or channels differ or the response is refused by
  * gn_response_check.
  */
-GN_MUST_USE int gn_composite_srgb8(const struct gn_composite_layers *layers,
-                                   const struct gn_image8 *background,
-                                   const struct gn_response *response, bool encoded_multiply,
-                                   struct gn_pool *pool, struct gn_image8 *out);
+GN_MUST_USE int gn_composite_image8(const struct gn_composite_layers *layers,
+                                    const struct gn_image8 *background,
+                                    const struct gn_response *response, bool encoded_multiply,
+                                    struct gn_pool *pool, struct gn_image8 *out);
 
 /** Linear radiance in, linear radiance out. Same rules. */
 GN_MUST_USE int gn_composite_linear(const struct gn_composite_layers *layers,

@@ -115,7 +115,7 @@ static int write_composite_png(const char *path, const struct gn_cli_result *res
         struct gn_image8 out = {0};
         int ret = gn_image8_init(&out, codes->width, codes->height, 3);
         if (ret == 0)
-            ret = gn_composite_srgb8(&layers, codes, response, false, pool, &out);
+            ret = gn_composite_image8(&layers, codes, response, false, pool, &out);
         if (ret < 0)
             (void)gn_error_set(out_error, ret, "%s: cannot composite", path);
         else

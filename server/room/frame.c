@@ -205,7 +205,7 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
                                                &b->layers.added};
     bool is_literal = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED;
     int64_t at = gn_clock_get_monotonic_ns();
-    rc = gn_composite_srgb8(&layers, &b->background, &camera->response, is_literal,
+    rc = gn_composite_image8(&layers, &b->background, &camera->response, is_literal,
                             m->options->pool, &b->composite);
     w->result->receipt.composite_ms += (float)lap(&at);
     return rc < 0 ? gn_error_set(error, rc, "the layers do not fit the picture") : 0;

@@ -61,11 +61,11 @@ static void test_untouched(void **state)
                             .to_rec709 = {2, -1, 0, 0, 1, 0, 0, 0, 1}};
     for (int e = 0; e < 2; e++) {
         memset(f->out.data, 9, WIDTH * HEIGHT * 3);
-        assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, e, NULL, &f->out), 0);
+        assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, e, NULL, &f->out), 0);
         assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
     }
     f->layers.shadow = f->layers.added = NULL;
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out), 0);
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out), 0);
     assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
 }
 
@@ -78,11 +78,12 @@ static void test_shadow_on_srgb(void **state)
         f->background.data[i] = 188;
         f->shadow.data[i] = 0.5f;
     }
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &srgb, false, NULL, &f->out),
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &srgb, false, NULL, &f->out),
                      0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
         assert_int_equal(f->out.data[i], 137);
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &srgb, true, NULL, &f->out), 0);
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &srgb, true, NULL, &f->out),
+                     0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
         assert_int_equal(f->out.data[i], 94);
 }
@@ -115,7 +116,7 @@ static void test_formula(void **state)
     assert_memory_equal(radiance.data, out.data, WIDTH * HEIGHT * 3 * sizeof(float));
     /* The 8-bit way, through a linear response of 1/16 radiance per code step. */
     struct gn_response linear = {.scale = 255.0 / 16};
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &linear, false, pool, &f->out),
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &linear, false, pool, &f->out),
                      0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
         double a = (double)f->rgba.data[i / 3 * 4 + 3], v = (double)f->rgba.data[i / 3 * 4 + i % 3];
@@ -135,12 +136,12 @@ static void test_refusals(void **state)
     struct gn_image small;
     assert_int_equal(gn_image_init(&small, WIDTH, HEIGHT - 1, 3), 0);
     f->layers.added = &small;
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out),
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out),
                      -EINVAL);
     assert_int_equal(gn_composite_linear(&f->layers, &small, NULL, &small), -EINVAL);
     f->layers.added = NULL;
     r.scale = -1;
-    assert_int_equal(gn_composite_srgb8(&f->layers, &f->background, &r, false, NULL, &f->out),
+    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out),
                      -EINVAL);
     gn_image_finish(&small);
 }
