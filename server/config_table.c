@@ -122,7 +122,7 @@ static const char notes[] =
     "\n"
     "Stop it with SIGTERM or SIGINT: every client is told. A value is taken from the\n"
     "command line before the environment (GNOMON_SERVER_THREADS), that before the\n"
-    "file; a room's keys are --room.NAME.KEY on the command line.\n";
+    "file; the keys of a [room NAME] are --room.NAME.KEY on the command line.\n";
 
 const struct gn_program gn_gnomond_program = {
     .name = "gnomond",

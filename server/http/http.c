@@ -152,16 +152,21 @@ static enum MHD_Result handle_request(void *context, struct MHD_Connection *conn
     struct gn_http *http = context;
     (void)version;
     (void)upload;
+    (void)upload_size;
     if (strcmp(method, MHD_HTTP_METHOD_GET) != 0 && strcmp(method, MHD_HTTP_METHOD_HEAD) != 0)
         return say(connection, MHD_HTTP_METHOD_NOT_ALLOWED, "text/plain; charset=utf-8",
                    "GET and HEAD are all there is.\n");
-    if (!*state) { // the first call: the body, if any, comes now
+    if (!*state) { // the headers: an answer may be given before the body, but not amid it
         *state = &seen;
+        const char *length = MHD_lookup_connection_value(connection, MHD_HEADER_KIND,
+                                                         MHD_HTTP_HEADER_CONTENT_LENGTH);
+        if ((length && strcmp(length, "0") != 0) ||
+            MHD_lookup_connection_value(connection, MHD_HEADER_KIND,
+                                        MHD_HTTP_HEADER_TRANSFER_ENCODING))
+            return say(connection, MHD_HTTP_CONTENT_TOO_LARGE, "text/plain; charset=utf-8",
+                       "A request here has no body.\n");
         return MHD_YES;
     }
-    if (*upload_size > 0)
-        return say(connection, MHD_HTTP_CONTENT_TOO_LARGE, "text/plain; charset=utf-8",
-                   "A request here has no body.\n");
     const char *host =
         MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST);
     const char *origin =

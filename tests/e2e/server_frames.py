@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""Frames through a real daemon: each id once, in the right light, with a whole receipt."""
+import struct
+import sys
+import time
+
+sys.path.insert(0, sys.argv[2])
+from gnomond import *  # noqa: E402,F403
+
+
+def test_composite_and_receipt():
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
+        light_up(light, 7)
+        frame_id = viewer.send_frame(lighting_min_sequence=7, lighting_wait_ms=20000)
+        result, payload = viewer.expect_result(frame_id)
+        view, receipt = result.views[0], result.receipt
+        assert (view.format, view.width, view.height) == (pb.PICTURE_FORMAT_RGB8, 32, 24), view
+        assert view.payload_length == len(payload) == 32 * 24 * 3
+        corner, middle = payload[:3], payload[3 * (12 * 32 + 16):][:3]
+        assert middle != b'\x80\x80\x80', 'no cube in the middle'
+        # Far from the cube the shadow is faint: at most a few codes.
+        assert all(abs(c - 128) <= 24 for c in corner), corner
+        assert receipt.lighting_sequence == 7 and receipt.lights_used > 0
+        assert receipt.rays_primary > 0 and receipt.rays_shadow > 0
+        assert abs(receipt.lighting_age_ms) < 60000 and receipt.queue_ms >= 0
+        assert receipt.primary_ms > 0 and receipt.composite_ms > 0
+        assert receipt.quality == pb.QUALITY_INTERACTIVE
+        assert result.capture_time_ns > 0
+
+
+def test_each_id_once():
+    """Frames faster than they can be rendered, from three viewers: every id comes back once."""
+    with Daemon() as daemon, probe(daemon) as light:
+        viewers = [Viewer(daemon, 160, 120) for _ in range(3)]
+        light_up(light)
+        viewers[0].expect_result(viewers[0].send_frame(lighting_min_sequence=1,
+                                                       lighting_wait_ms=20000))
+        n = 40
+        for _ in range(n):
+            for viewer in viewers:
+                viewer.send_frame()
+        for viewer in viewers:
+            first = 2 if viewer is viewers[0] else 1
+            answers = [viewer.take() for _ in range(n)]
+            assert sorted(m.id for _, m, _ in answers) == list(range(first, first + n))
+            last = [kind for kind, m, _ in answers if m.id == viewer.last_id]
+            assert last == [RESULT], 'the newest frame was lost'
+            assert {m.reason for kind, m, _ in answers if kind == DROPPED} <= \
+                {pb.DROP_REASON_SUPERSEDED, pb.DROP_REASON_OVERLOAD}
+            # One answer each and no more: what comes next is the answer to the PING.
+            viewer.send(PING, pb.Ping(t1_ns=5))
+            assert viewer.expect(PONG)[0].t1_ns == 5
+        dropped = [m for _, m, _ in answers if not hasattr(m, 'views')]
+        assert dropped, 'no frame was superseded: the test has to send faster'
+        for viewer in viewers:
+            viewer.close()
+
+
+def test_one_outstanding_loses_nothing():
+    """At the rate that the server states, with one frame outstanding, nothing is dropped."""
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 640, 480) as viewer:
+        light_up(light)
+        for _ in range(12):
+            viewer.expect_result(viewer.send_frame(lighting_min_sequence=1,
+                                                   lighting_wait_ms=20000))
+        with Client(daemon, pb.ROLE_VIEWER) as other:  # two viewers now: half for each
+            share = other.welcome.holdable_fps
+        assert share > 0
+        other.close()
+        interval, due = 1 / (2 * share), time.monotonic()
+        print('# holds %.1f frames/s at 640x480' % (2 * share))
+        for _ in range(min(60, int(4 / interval) + 2)):
+            time.sleep(max(0, due - time.monotonic()))
+            due = max(due + interval, time.monotonic())
+            viewer.expect_result(viewer.send_frame())
+
+
+def test_waiting_for_light():
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as patient, \
+            Viewer(daemon) as other:
+        sentence = other.expect_dropped(other.send_frame(), pb.DROP_REASON_NO_LIGHTING)
+        assert 'probe' in sentence
+        start = time.monotonic()
+        other.expect_dropped(other.send_frame(lighting_wait_ms=200), pb.DROP_REASON_NO_LIGHTING)
+        assert 0.15 < time.monotonic() - start < 10
+        light_up(light, 3)
+        other.expect_result(other.send_frame(lighting_min_sequence=3, lighting_wait_ms=20000))
+        # One waits for light 4; the other is not held up by it.
+        waiting = patient.send_frame(lighting_min_sequence=4, lighting_wait_ms=20000)
+        for _ in range(5):
+            other.expect_result(other.send_frame())
+        light_up(light, 4)
+        assert patient.expect_result(waiting)[0].receipt.lighting_sequence == 4
+        # The wait over, the light that is there serves.
+        late = patient.send_frame(lighting_min_sequence=99, lighting_wait_ms=100)
+        assert patient.expect_result(late)[0].receipt.lighting_sequence == 4
+
+
+def test_reasons():
+    """Frames that cannot be made come back with the reason, and the session goes on."""
+    with Daemon('allow-reference = false\nmax-picture-width = 64') as daemon, \
+            probe(daemon) as light, Viewer(daemon) as viewer:
+        light_up(light)
+        good = dict(lighting_min_sequence=1, lighting_wait_ms=20000)
+        viewer.expect_result(viewer.send_frame(**good))
+        viewer.expect_dropped(viewer.send_frame(pose=None), pb.DROP_REASON_NO_POSE)
+        viewer.send(POSE, pb.Pose(world_from_object=DOWN))
+        viewer.expect_result(viewer.send_frame(pose=None))
+        wrong = pb.FrameView(world_from_camera=DOWN, camera=2,
+                             picture_format=pb.PICTURE_FORMAT_NONE)
+        viewer.expect_dropped(viewer.send_frame(b'', views=[wrong]), pb.DROP_REASON_NO_CAMERA)
+        assert '2304' in viewer.expect_dropped(viewer.send_frame(b'\1' * 300),
+                                               pb.DROP_REASON_BAD_FRAME)
+        viewer.expect_dropped(viewer.send_frame(b'\xff\xd8 no JPEG',
+                                                picture_format=pb.PICTURE_FORMAT_JPEG),
+                              pb.DROP_REASON_BAD_PICTURE)
+        viewer.expect_dropped(viewer.send_frame(quality=pb.QUALITY_REFERENCE),
+                              pb.DROP_REASON_UNSUPPORTED)
+        viewer.send(CAMERA, camera(65, 24))
+        error, _ = viewer.expect(ERROR)
+        assert error.code == pb.ERROR_CODE_BAD_VALUE and not error.fatal and '64' in error.sentence
+        viewer.send(POSE, pb.Pose(object='cube', world_from_object=DOWN))
+        error, _ = viewer.expect(ERROR)
+        assert error.code == pb.ERROR_CODE_UNSUPPORTED and not error.fatal, error
+        viewer.expect_result(viewer.send_frame())
+
+
+def test_views_and_jpeg():
+    """Two views in one frame, JPEG both ways, no picture at all."""
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 64, 48) as viewer:
+        viewer.send(CAMERA, camera(32, 24, index=1))
+        light_up(light)
+        small = bytes(32 * 24 * 3)
+        views = [pb.FrameView(world_from_camera=DOWN, camera=0, payload_length=64 * 48 * 3,
+                              picture_format=pb.PICTURE_FORMAT_RGB8),
+                 pb.FrameView(world_from_camera=DOWN, camera=1, payload_offset=64 * 48 * 3,
+                              payload_length=len(small), picture_format=pb.PICTURE_FORMAT_RGB8)]
+        frame_id = viewer.send_frame(viewer.picture + small, views=views,
+                                     lighting_min_sequence=1, lighting_wait_ms=20000)
+        result, payload = viewer.expect_result(frame_id)
+        assert [(v.width, v.height) for v in result.views] == [(64, 48), (32, 24)]
+        assert len(payload) == 3 * (64 * 48 + 32 * 24)
+        frame_id = viewer.send_frame(result_format=pb.PICTURE_FORMAT_JPEG)
+        result, jpeg = viewer.expect_result(frame_id)
+        assert jpeg[:2] == b'\xff\xd8' and result.views[0].format == pb.PICTURE_FORMAT_JPEG
+        frame_id = viewer.send_frame(jpeg, picture_format=pb.PICTURE_FORMAT_JPEG)
+        assert len(viewer.expect_result(frame_id)[1]) == 64 * 48 * 3
+        frame_id = viewer.send_frame(b'', picture_format=pb.PICTURE_FORMAT_NONE)
+        assert viewer.expect_result(frame_id)[1][:3] == b'\0\0\0'
+
+
+def test_environment_formats():
+    """The same constant light in every format gives the same irradiance."""
+    n = 32 * 16
+    log = dict(type=pb.RESPONSE_TYPE_LOG, log_a=0.5, log_b=0.1, log_c=0.0)
+    table = struct.pack('<3f', 0, 1, 2)
+    cases = [
+        dict(),
+        dict(pixel_format=pb.PIXEL_FORMAT_RGB_F16, pixels=b'\x00\x3c' * (3 * n)),
+        dict(pixel_format=pb.PIXEL_FORMAT_MONO16, scale=1.0, pixels=b'\xff\xff' * n),
+        dict(pixel_format=pb.PIXEL_FORMAT_RGB12, pixels=b'\xff\x0f' * (3 * n)),
+        dict(pixel_format=pb.PIXEL_FORMAT_MONO12, pixels=struct.pack('<H', 2048) * n,
+             response=pb.Response(**log)),
+        dict(pixel_format=pb.PIXEL_FORMAT_RGB16, pixels=table + struct.pack('<H', 32768) * (3 * n),
+             response=pb.Response(type=pb.RESPONSE_TYPE_TABLE, table_entries=3)),
+    ]
+    with Daemon() as daemon, probe(daemon, want_lighting_states=True) as light:
+        for i, case in enumerate(cases, 1):
+            light_up(light, i, **case)
+            state, payload = light.expect(LIGHTING_STATE)
+            assert state.sequence == i and state.room == 'demo'
+            assert len(payload) == 32 * state.light_count
+            # Radiance 1 everywhere: L00 = sqrt(4 pi), and the lights add up to 4 pi.
+            assert abs(state.sh[0] - 3.5449077) < 0.02, (i, state.sh[0])
+            lights = [struct.unpack_from('<8f', payload, 32 * k)
+                      for k in range(state.light_count)]
+            total = sum(v[4] for v in lights)
+            assert abs(total - 12.566) < 0.2, (i, total)
+            assert all(abs(v[0]**2 + v[1]**2 + v[2]**2 - 1) < 1e-3 for v in lights)
+    with Daemon() as daemon, probe(daemon, want_lighting_maps=True) as light:
+        light_up(light)
+        state, payload = light.expect(LIGHTING_STATE)
+        assert (state.map_width, state.map_height) == (512, 256)
+        texels = payload[32 * state.light_count:]
+        assert len(texels) == 512 * 256 * 6 and texels[:6] == b'\x00\x3c' * 3
+
+
+def test_statistics():
+    with Daemon() as daemon, probe(daemon) as light, \
+            Viewer(daemon, want_statistics=True) as viewer:
+        light_up(light)
+        frame_id, n, seen = viewer.send_frame(lighting_min_sequence=1, lighting_wait_ms=20000), 0, 0
+        deadline = time.monotonic() + 20
+        while time.monotonic() < deadline and not (n and seen):
+            kind, message, _ = viewer.receive()
+            if kind == RESULT:
+                assert message.id == frame_id
+                n += 1
+            elif kind == STATISTICS and message.frames_out == 1:
+                assert message.sessions == 2 and message.frames_in == 1
+                assert message.holdable_fps > 0 and message.median_frame_ms >= 0
+                assert message.environment_frames_in == 1
+                seen += 1
+        assert n == 1 and seen
+
+
+def test_no_work_without_need():
+    """Light is not made for a room where nobody wants it, and is made when somebody comes."""
+    import json
+    with Daemon() as daemon, probe(daemon) as light:
+        light_up(light, 5)
+        light.send(PING, pb.Ping(t1_ns=1))
+        light.expect(PONG)
+        time.sleep(0.2)
+        room = json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]
+        assert room['light'] == {'lit': False, 'environment_frame_waiting': True}, room['light']
+        with Viewer(daemon) as viewer:
+            frame_id = viewer.send_frame(lighting_min_sequence=5, lighting_wait_ms=20000)
+            viewer.expect_result(frame_id)
+
+
+def test_shutdown():
+    """SIGTERM tells every session, and the daemon ends at once although one never reads."""
+    daemon = Daemon()
+    with Viewer(daemon) as viewer, probe(daemon) as light, Client(daemon):
+        light_up(light)
+        viewer.send(PING, pb.Ping(t1_ns=1))
+        viewer.expect(PONG)
+        start = time.monotonic()
+        daemon.process.send_signal(signal.SIGTERM)
+        bye, _ = viewer.expect(BYE)
+        assert bye.reason == pb.BYE_REASON_SHUTDOWN
+        viewer.expect_closed()
+        daemon.stop()
+        assert time.monotonic() - start < 15
+
+
+run_tests([test_composite_and_receipt, test_each_id_once, test_one_outstanding_loses_nothing,
+           test_waiting_for_light, test_reasons, test_views_and_jpeg, test_environment_formats,
+           test_statistics, test_no_work_without_need, test_shutdown])
