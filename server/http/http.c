@@ -112,8 +112,11 @@ static enum MHD_Result give_picture(struct gn_http *http, struct MHD_Connection 
     if (room && strcmp(slash, "/composite.jpg") == 0)
         return give(connection, MHD_HTTP_OK, gn_http_make_composite(&http->view, room, &document),
                     &document);
+    if (room && strcmp(slash, "/light.jpg") == 0)
+        return give(connection, MHD_HTTP_OK, gn_http_make_light(&http->view, room, &document),
+                    &document);
     return say(connection, MHD_HTTP_NOT_FOUND, "text/plain; charset=utf-8",
-               room ? "A room has composite.jpg.\n" : "There is no such room.\n");
+               room ? "A room has composite.jpg and light.jpg.\n" : "There is no such room.\n");
 }
 
 static enum MHD_Result route(struct gn_http *http, struct MHD_Connection *connection,
@@ -141,7 +144,7 @@ static enum MHD_Result route(struct gn_http *http, struct MHD_Connection *connec
         return give_picture(http, connection, url + sizeof(rooms) - 1);
     return say(connection, MHD_HTTP_NOT_FOUND, "text/plain; charset=utf-8",
                "Here are /, /api/v1/status, /api/v1/rooms/NAME/composite.jpg, "
-               "/metrics, /healthz and /readyz.\n");
+               "/api/v1/rooms/NAME/light.jpg, /metrics, /healthz and /readyz.\n");
 }
 
 static enum MHD_Result handle_request(void *context, struct MHD_Connection *connection,

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "server/http/http_internal.h"
+#include "server/light/light_picture.h"
 
 static int encode(struct gn_jpeg *jpeg, const struct gn_image8 *image, struct gn_document *out)
 {
@@ -29,5 +30,19 @@ int gn_http_make_composite(struct gn_http_view *view, struct gn_room *room, stru
         return -ENOENT;
     int rc = encode(view->jpeg, &snapshot->image, out);
     gn_snapshot_unref(&snapshot);
+    return rc;
+}
+
+int gn_http_make_light(struct gn_http_view *view, struct gn_room *room, struct gn_document *out)
+{
+    struct gn_lighting_state *light = gn_room_get_light(room);
+    if (!light)
+        return -ENOENT;
+    struct gn_image8 picture = {0};
+    int rc = gn_light_picture_make(light, NULL, NULL, &picture);
+    gn_lighting_state_unref(&light);
+    if (rc == 0)
+        rc = encode(view->jpeg, &picture, out);
+    gn_image8_finish(&picture);
     return rc;
 }
