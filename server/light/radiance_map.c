@@ -28,6 +28,7 @@ struct work {
     const struct gn_environment_frame *frame;
     struct gn_radiance_map *map;
     struct gn_response linear; // the response after decoding: matrix and scale
+    bool is_radiance;          // after decoding: neither matrix nor scale
     float *decoded;            // [code_max + 1], may be NULL: decode texel by texel
     struct row_sums *rows;     // [height]
 };
@@ -60,7 +61,9 @@ static void decode_row(void *context, int y, int worker)
         const float *code = gn_image_at(codes, x, y);
         bool is_nan = false, is_inf = false, is_negative = false, is_clipped = false;
         for (int c = 0; c < 3; c++) {
-            float v = mend_code(code[is_mono ? 0 : c], &is_nan, &is_inf, &is_negative);
+            float v = code[is_mono ? 0 : c];
+            if (!(v >= 0 && v < INFINITY))
+                v = mend_code(v, &is_nan, &is_inf, &is_negative);
             is_clipped = is_clipped || (is_integer && v >= 1);
             row[3 * x + c] = work->decoded ? look_up(work, v) : v;
         }
@@ -69,14 +72,16 @@ static void decode_row(void *context, int y, int worker)
         sums->n_negative += is_negative;
         sums->n_clipped += is_clipped;
     }
-    gn_response_to_radiance(&work->linear, row, codes->width);
+    if (!work->is_radiance)
+        gn_response_to_radiance(&work->linear, row, codes->width);
     const float *solid_angle = map->solid_angle + (size_t)y * (size_t)codes->width;
     for (int x = 0; x < codes->width; x++) {
         bool is_capped = false;
         for (int c = 0; c < 3; c++) {
             float v = row[3 * x + c];
             is_capped = is_capped || v > GN_RADIANCE_MAX;
-            row[3 * x + c] = v > 0 && solid_angle[x] > 0 ? fminf(v, GN_RADIANCE_MAX) : 0;
+            v = v < GN_RADIANCE_MAX ? v : GN_RADIANCE_MAX;
+            row[3 * x + c] = solid_angle[x] > 0 ? v : 0;
         }
         sums->n_capped += is_capped;
     }
@@ -146,17 +151,23 @@ static void sum_row(void *context, int y, int worker)
     const double *axis = map->table->axis_world;
     struct row_sums *sums = &work->rows[y];
     size_t width = (size_t)map->radiance.width, start = (size_t)y * width;
-    for (size_t i = start; i < start + width; i++) {
+    double sum[3] = {0}, upward[3] = {0}, luminance = 0, max = 0;
+    for (size_t i = start; i < start + width; i++) { // no light where no solid angle
         const float *l = map->radiance.data + 3 * i, *d = map->direction_world + 3 * i;
-        double w = (double)map->solid_angle[i], luminance = gn_luminance(l);
+        double w = (double)map->solid_angle[i], y_texel = gn_luminance(l);
         double up = axis[0] * (double)d[0] + axis[1] * (double)d[1] + axis[2] * (double)d[2];
-        sums->luminance += luminance * w;
-        sums->max_luminance = fmax(sums->max_luminance, w > 0 ? luminance : 0);
+        up = up > 0 ? up * w : 0;
+        luminance += y_texel * w;
+        max = y_texel > max ? y_texel : max;
         for (int c = 0; c < 3; c++) {
-            sums->irradiance[c] += (double)l[c] * w;
-            sums->upward[c] += (double)l[c] * w * fmax(up, 0);
+            sum[c] += (double)l[c] * w;
+            upward[c] += (double)l[c] * up;
         }
     }
+    sums->luminance = luminance;
+    sums->max_luminance = max;
+    memcpy(sums->irradiance, sum, sizeof(sum));
+    memcpy(sums->upward, upward, sizeof(upward));
 }
 
 static void sum_figures(const struct work *work, double out_upward[static 3])
@@ -188,6 +199,11 @@ static int make_decoder(struct work *work)
 {
     const struct gn_environment_frame *frame = work->frame;
     work->linear = frame->response;
+    bool has_matrix = frame->response.scale != 0 && frame->response.scale != 1;
+    for (int i = 0; i < 9; i++)
+        has_matrix = has_matrix || frame->response.to_rec709[i] != 0;
+    work->is_radiance =
+        !has_matrix && (frame->response.type == GN_RESPONSE_LINEAR || frame->code_max > 0);
     if (frame->code_max == 0 || frame->response.type == GN_RESPONSE_LINEAR)
         return 0;
     size_t n = (size_t)frame->code_max + 1;

@@ -43,6 +43,7 @@ struct projection_work {
 static void project_row(const struct gn_radiance_map *map, int y, struct row_harmonics *out)
 {
     size_t width = (size_t)map->radiance.width, start = (size_t)y * width;
+    double sum[3][10] = {{0}};
     for (size_t i = start; i < start + width; i++) {
         double w = (double)map->solid_angle[i];
         if (!(w > 0))
@@ -50,21 +51,24 @@ static void project_row(const struct gn_radiance_map *map, int y, struct row_har
         const float *d = map->direction_world + 3 * i, *l = map->radiance.data + 3 * i;
         double dx = (double)d[0], dy = (double)d[1], dz = (double)d[2];
         double w1 = w * (1 - w / 12), w2 = w * (1 - w / 4);
-        double b[9] = {w,
-                       w1 * dy,
-                       w1 * dz,
-                       w1 * dx,
-                       w2 * dx * dy,
-                       w2 * dy * dz,
-                       w2 * (3 * dz * dz - 1),
-                       w2 * dz * dx,
-                       w2 * (dx * dx - dy * dy)};
+        double b[10] = {w,
+                        w1 * dy,
+                        w1 * dz,
+                        w1 * dx,
+                        w2 * dx * dy,
+                        w2 * dy * dz,
+                        w2 * (3 * dz * dz - 1),
+                        w2 * dz * dx,
+                        w2 * (dx * dx - dy * dy)};
         for (int c = 0; c < 3; c++) {
             double v = (double)l[c];
-            for (int k = 0; k < 9; k++)
-                out->h[k][c] += b[k] * v;
+            for (int k = 0; k < 10; k++) // the tenth is 0: pairs suit the machine
+                sum[c][k] += b[k] * v;
         }
     }
+    for (int k = 0; k < 9; k++)
+        for (int c = 0; c < 3; c++)
+            out->h[k][c] = sum[c][k];
 }
 
 /* Lat-long texels are boxes in theta and phi: their integrals are products, and exact. */

@@ -45,7 +45,7 @@ static bool keep(struct found best[N_WANTED], const struct found *tried)
 /* Tries settings until each wanted number is met, the paper's likely ones first. */
 static void search(const struct gn_environment_frame *frame, struct found best[N_WANTED])
 {
-    static const int rings[] = {8, 6, 7, 9, 10, 5, 12, 4};
+    static const int rings[] = {8, 6, 7, 9, 10, 5, 12, 18};
     static const int max_ls[] = {8, 1, 64, 4, 16, 2};
     struct gn_lighting_state *state = NULL;
     bool is_done = false;
@@ -53,7 +53,7 @@ static void search(const struct gn_environment_frame *frame, struct found best[N
         int r = rings[i / 24 % 8];
         struct gn_light_options options = {.method = GN_LIGHT_PARTITION_SEED,
                                            .rings = r,
-                                           .sectors = 3 * r + 2 * (i / 192) - 2,
+                                           .sectors = 3 * r + 2 * (i / 192) - 6,
                                            .max_ls = max_ls[i / 4 % 6],
                                            .metric = i % 2 ? GN_METRIC_TWICE : GN_METRIC_POW2,
                                            .mended = i / 2 % 2 ? GN_READ_SAMPLE_MEAN : 0,
