@@ -18,8 +18,10 @@
 #define BATCH (TILE * TILE)
 /** Mirrors a ray may meet one after another; after that it takes the map's radiance. */
 #define MIRROR_DEPTH 8
-/** Words of a bit set with one bit for each light. */
-#define LIGHT_WORDS (GN_LIGHTS_MAX / 64)
+/** Receivers of a block, neighbours in the picture: as many as a packet's rays. */
+#define LANES GN_RT_PACKET
+/** Boxes that real geometry is put in for conservative tests. */
+#define MAX_BLOCKERS 64
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
 
@@ -78,11 +80,25 @@ struct feature {
     float color[3]; // its radiance, or the shadow factor
 };
 
+/** The diffuse real samples of a batch, in structure-of-arrays form and blocks of LANES. */
+struct receivers {
+    int n, n_blocks;
+    int sample[BATCH]; // index of the sample
+    _Alignas(64) float org[3][BATCH];
+    _Alignas(64) float shading[3][BATCH]; // normals
+    _Alignas(64) float geometric[3][BATCH];
+    uint16_t wanted[BATCH / LANES];  // bit i: the sums of lane i are needed
+    struct box boxes[BATCH / LANES]; // of each block's org
+    struct box box;                  // of all
+};
+
 /** What one worker needs for a batch, and its counts. */
 struct scratch {
     struct sample samples[BATCH];
-    int lit[BATCH];                       // indices of samples that a pass works on
-    uint64_t blocked[BATCH][LIGHT_WORDS]; // per such sample: lights that virtual objects hide
+    int lit[BATCH]; // indices of samples that shading works on
+    struct receivers receivers;
+    uint16_t cut[BATCH / LANES][GN_LIGHTS_MAX];    // per block and light, bit i: virtual objects
+    uint16_t hidden[BATCH / LANES][GN_LIGHTS_MAX]; // (real objects) hide it from lane i
     struct gn_rt_packet packet;
     int lane_sample[GN_RT_PACKET];
     int lane_light[GN_RT_PACKET];
@@ -115,9 +131,12 @@ struct frame {
     const float *rays;           // [h][w][3] of pixel centres, camera frame; z 0: none
     bool has_real, has_virtual;
     struct box real_box, virtual_box; // the virtual one widened against rounding
-    const struct light_list *lights;  // seed, interactive: the state's; reference: the map's
-    double floor_irradiance[3];       // sums up to this are no light (1e-6 of all)
-    float floor_radiance;             // radiances below this do not make contrast
+    const struct box *blockers;       // [n_blockers] real objects, exact
+    const struct box *wide_blockers;  // the same, widened against rounding
+    int n_blockers;
+    const struct light_list *lights; // seed, interactive: the state's; reference: the map's
+    double floor_irradiance[3];      // sums up to this are no light (1e-6 of all)
+    float floor_radiance;            // radiances below this do not make contrast
 
     // The plan: what runs.
     bool run_shadow;   // shadow on real surfaces
@@ -180,6 +199,11 @@ void gn_shadow_weigh(const struct frame *frame, struct sample *sample);
 void gn_shadow_see_nothing(const struct frame *frame, struct sample *sample);
 /** Zeroes the sums. */
 void gn_shadow_clear(struct sample *sample);
+
+/* blockers.c */
+
+/** Boxes of the real objects, each in one. Returns their number. */
+int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static MAX_BLOCKERS]);
 
 /* reference.c */
 

@@ -49,6 +49,17 @@ uint32_t gn_packet_trace(const struct frame *frame, struct scratch *scratch, enu
     return gn_rt_get_occluded16(frame->rt, set, packet);
 }
 
+/** As fminf and fmaxf, which are calls; none of these is NaN. */
+static inline float min2(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float max2(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 /** Slabs: the ray meets the box where the intervals of the three axes and [0, inf) meet. */
 static bool meets_slabs(const float lo[static 3], const float hi[static 3],
                         const float dir[static 3])
@@ -64,8 +75,8 @@ static bool meets_slabs(const float lo[static 3], const float hi[static 3],
         float inverse = 1.0f / dir[k];
         float a = lo[k] * inverse;
         float b = hi[k] * inverse;
-        t0 = fmaxf(t0, fminf(a, b));
-        t1 = fminf(t1, fmaxf(a, b));
+        t0 = max2(t0, min2(a, b));
+        t1 = min2(t1, max2(a, b));
     }
     // Rounding of the products: a few parts in 2^24; the box is widened by far more (renderer.c).
     return t0 <= t1 * (1 + 4e-6f);

@@ -30,6 +30,8 @@ struct gn_renderer {
     struct tile_figures *figures;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
     double slopes[4];
+    struct box blockers[MAX_BLOCKERS], wide_blockers[MAX_BLOCKERS]; // [n_blockers]
+    int n_blockers;
 };
 
 int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
@@ -51,6 +53,7 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
                             pool ? gn_pool_get_size(pool) : 1);
     }
     memset(renderer->scratches, 0, bytes);
+    renderer->n_blockers = gn_blockers_make(scene, renderer->blockers);
     *out_renderer = renderer;
     return 0;
 }
@@ -221,17 +224,20 @@ static void keep_feature(const struct frame *frame, int x, int y, const struct s
                                                 : 1);
 }
 
-/** A tile's pixels. */
-struct tile {
-    int x0, y0, x1, y1;
-};
-
-static struct tile get_tile(const struct frame *frame, int item)
+/** A tile's pixels, in squares of 4 x 4 so that a block of 16 receivers is compact. */
+static int list_pixels(const struct frame *frame, int item, int (*out_pixels)[2])
 {
-    struct tile tile = {.x0 = item % frame->tiles_x * TILE, .y0 = item / frame->tiles_x * TILE};
-    tile.x1 = tile.x0 + TILE < frame->camera->width ? tile.x0 + TILE : frame->camera->width;
-    tile.y1 = tile.y0 + TILE < frame->camera->height ? tile.y0 + TILE : frame->camera->height;
-    return tile;
+    int n = 0;
+    for (int i = 0; i < BATCH; i++) {
+        int square = i / 16;
+        int x = item % frame->tiles_x * TILE + square % 4 * 4 + i % 4;
+        int y = item / frame->tiles_x * TILE + square / 4 * 4 + i % 16 / 4;
+        if (x >= frame->camera->width || y >= frame->camera->height)
+            continue;
+        out_pixels[n][0] = x;
+        out_pixels[n++][1] = y;
+    }
+    return n;
 }
 
 static void render_centres(void *context, int item, int worker)
@@ -239,29 +245,28 @@ static void render_centres(void *context, int item, int worker)
     const struct frame *frame = context;
     struct scratch *scratch = &frame->scratches[worker];
     struct tile_figures *figures = &frame->figures[item];
-    struct tile tile = get_tile(frame, item);
+    int pixels[BATCH][2];
+    int n = list_pixels(frame, item, pixels);
     memset(figures, 0, sizeof(*figures));
-    int n = 0;
-    for (int y = tile.y0; y < tile.y1; y++) {
-        for (int x = tile.x0; x < tile.x1; x++, n++) {
-            struct sample *s = &scratch->samples[n];
-            s->group = n;
-            init_sample(frame, s, x, y, 0);
-            gn_primary_aim(
-                frame, frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
-        }
+    for (int i = 0; i < n; i++) {
+        struct sample *s = &scratch->samples[i];
+        int x = pixels[i][0];
+        int y = pixels[i][1];
+        s->group = i;
+        init_sample(frame, s, x, y, 0);
+        gn_primary_aim(frame,
+                       frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
     }
     process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
-    int i = 0;
-    for (int y = tile.y0; y < tile.y1; y++) {
-        for (int x = tile.x0; x < tile.x1; x++, i++) {
-            const struct sample *s = &scratch->samples[i];
-            *gn_image_at(&frame->layers->depth, x, y) = s->depth;
-            gn_layers_resolve(frame, x, y, s, 1);
-            keep_feature(frame, x, y, s);
-            if (frame->run_shadow)
-                estimate_error(frame, s, figures);
-        }
+    for (int i = 0; i < n; i++) {
+        const struct sample *s = &scratch->samples[i];
+        int x = pixels[i][0];
+        int y = pixels[i][1];
+        *gn_image_at(&frame->layers->depth, x, y) = s->depth;
+        gn_layers_resolve(frame, x, y, s, 1);
+        keep_feature(frame, x, y, s);
+        if (frame->run_shadow)
+            estimate_error(frame, s, figures);
     }
 }
 
@@ -305,32 +310,36 @@ static void render_edges(void *context, int item, int worker)
     const struct frame *frame = context;
     struct scratch *scratch = &frame->scratches[worker];
     struct tile_figures *figures = &frame->figures[item];
-    struct tile tile = get_tile(frame, item);
     int parts = frame->rule.grid * frame->rule.grid;
     int pixels[BATCH][2];
-    int n = 0;
-    for (int y = tile.y0; y < tile.y1; y++) {
-        for (int x = tile.x0; x < tile.x1; x++) {
-            if (!gn_refine_is_needed(frame, x, y))
-                continue;
-            pixels[n][0] = x;
-            pixels[n++][1] = y;
-            if ((n + 1) * parts > BATCH) {
-                refine_pixels(frame, scratch, pixels, n, figures);
-                n = 0;
-            }
+    int edges[BATCH][2];
+    int n_edges = 0;
+    int n = list_pixels(frame, item, pixels);
+    for (int i = 0; i < n; i++) {
+        if (!gn_refine_is_needed(frame, pixels[i][0], pixels[i][1]))
+            continue;
+        memcpy(edges[n_edges++], pixels[i], sizeof(edges[0]));
+        if ((n_edges + 1) * parts > BATCH) {
+            refine_pixels(frame, scratch, edges, n_edges, figures);
+            n_edges = 0;
         }
     }
-    if (n > 0)
-        refine_pixels(frame, scratch, pixels, n, figures);
-    for (int y = tile.y0; y < tile.y1; y++) {
-        for (int x = tile.x0; x < tile.x1; x++)
-            count_pixel(frame, x, y, figures);
+    if (n_edges > 0)
+        refine_pixels(frame, scratch, edges, n_edges, figures);
+    for (int i = 0; i < n; i++)
+        count_pixel(frame, pixels[i][0], pixels[i][1], figures);
+}
+
+static void widen_box(struct box *box, float by)
+{
+    for (int k = 0; k < 3; k++) {
+        box->min[k] -= by;
+        box->max[k] += by;
     }
 }
 
-/** The virtual box is widened by far more than single-precision slabs can be off. */
-static void init_boxes(struct frame *frame)
+/** Boxes for tests of rays are widened by far more than single-precision slabs can be off. */
+static void init_boxes(struct frame *frame, struct gn_renderer *renderer)
 {
     float largest = 0;
     frame->has_real =
@@ -345,10 +354,14 @@ static void init_boxes(struct frame *frame)
             largest = fmaxf(
                 largest, fmaxf(fabsf(frame->virtual_box.min[k]), fabsf(frame->virtual_box.max[k])));
     }
-    for (int k = 0; k < 3; k++) {
-        frame->virtual_box.min[k] -= 1e-5f * largest;
-        frame->virtual_box.max[k] += 1e-5f * largest;
+    widen_box(&frame->virtual_box, 1e-5f * largest);
+    for (int i = 0; i < renderer->n_blockers; i++) {
+        renderer->wide_blockers[i] = renderer->blockers[i];
+        widen_box(&renderer->wide_blockers[i], 1e-5f * largest);
     }
+    frame->blockers = renderer->blockers;
+    frame->wide_blockers = renderer->wide_blockers;
+    frame->n_blockers = renderer->n_blockers;
 }
 
 static void init_light(struct frame *frame)
@@ -384,7 +397,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
         frame->options.shadow_unweighted = frame->options.shadow_ignore_real = true;
     if (frame->options.paths_per_pixel == 0)
         frame->options.paths_per_pixel = DEFAULT_PATHS;
-    init_boxes(frame);
+    init_boxes(frame, renderer);
     init_light(frame);
 }
 

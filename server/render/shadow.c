@@ -4,115 +4,232 @@
  * The paper's shadow factor (section 5.2), per pixel and channel:
  *   U = sum w_i Phi_i V_real,i   S = sum w_i Phi_i V_real,i (1 - V_virtual,i)   factor = 1 - S / U
  * with w_i the cosine (Lambert: albedo and pi cancel) or, as the paper has it, 1 for every light
- * above the surface. Two steps: which lights do virtual objects hide; then, only for pixels with
- * such a light, the sums.
+ * above the surface. Three steps: which lights do virtual objects hide; for pixels with such a
+ * light, which do real objects hide; the sums, in the order of the lights.
+ *
+ * Receivers go through in blocks of 16 neighbours. Left out, and no bit of the result with them,
+ * are rays that surely meet nothing: a light whose rays from a block's box miss the virtual
+ * objects' box; for real objects, the same with each object's box, and before that objects that
+ * lie wholly under the tangent planes of all receivers, such as the table that they are points of.
  */
 #include "server/render/internal.h"
 
 #include <math.h>
 #include <string.h>
 
-static float weigh_light(const struct frame *frame, const struct gn_surface *surface,
-                         const float dir[static 3])
+static void grow_box(struct box *box, const float p[static 3])
 {
-    float c = surface_cosine(surface, dir);
-    return c > 0 && frame->options.shadow_unweighted ? 1 : c;
-}
-
-static void flush_virtual(const struct frame *frame, struct scratch *scratch,
-                          struct tile_figures *figures)
-{
-    int n;
-    uint32_t hidden = gn_packet_trace(frame, scratch, GN_RT_VIRTUAL, &n, &figures->rays_shadow);
-    for (int lane = 0; lane < n; lane++) {
-        if (!(hidden >> lane & 1))
-            continue;
-        int j = scratch->lane_sample[lane];
-        int light = scratch->lane_light[lane];
-        scratch->blocked[j][light / 64] |= UINT64_C(1) << (light % 64);
-        scratch->samples[scratch->lit[j]].is_cut = true;
-    }
-}
-
-/** Which lights do virtual objects hide from the m samples of scratch->lit? */
-static void find_blocked(const struct frame *frame, struct scratch *scratch, int m,
-                         struct tile_figures *figures)
-{
-    const struct light_list *lights = frame->lights;
-    size_t words = (size_t)(lights->n + 63) / 64;
-    struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int j = 0; j < m; j++) {
-        const float *org = scratch->samples[scratch->lit[j]].org;
-        memset(scratch->blocked[j], 0, words * sizeof(uint64_t));
-        for (int k = 0; k < 3; k++) {
-            box.min[k] = fminf(box.min[k], org[k]);
-            box.max[k] = fmaxf(box.max[k], org[k]);
-        }
-    }
-    for (int l = 0; l < lights->n; l++) {
-        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-        if (frame->cull && !gn_box_may_meet_from_box(&frame->virtual_box, &box, dir))
-            continue;
-        for (int j = 0; j < m; j++) {
-            const struct sample *s = &scratch->samples[scratch->lit[j]];
-            if (!(surface_cosine(&s->surface, dir) > 0))
-                continue;
-            if (frame->cull && !gn_box_may_meet(&frame->virtual_box, s->org, dir))
-                continue;
-            if (gn_packet_add(scratch, s->org, dir, j, l, 0))
-                flush_virtual(frame, scratch, figures);
-        }
-    }
-    flush_virtual(frame, scratch, figures);
-}
-
-static void add_light(const struct frame *frame, struct scratch *scratch, int j, int light,
-                      double weight)
-{
-    struct sample *s = &scratch->samples[scratch->lit[j]];
-    bool is_cut = scratch->blocked[j][light / 64] >> (light % 64) & 1;
     for (int k = 0; k < 3; k++) {
-        double e = weight * frame->lights->irradiance[k][light];
-        s->open[light & 1][k] += e;
-        if (is_cut)
-            s->cut[light & 1][k] += e;
+        box->min[k] = fminf(box->min[k], p[k]);
+        box->max[k] = fmaxf(box->max[k], p[k]);
     }
 }
 
-static void flush_real(const struct frame *frame, struct scratch *scratch,
-                       struct tile_figures *figures)
+/** Arrays of the real samples; the last block is filled up with receivers that no light reaches. */
+static void gather_receivers(const struct sample *samples, int n, struct receivers *r)
+{
+    static const struct box empty = {{INFINITY, INFINITY, INFINITY},
+                                     {-INFINITY, -INFINITY, -INFINITY}};
+    r->n = 0;
+    r->box = empty;
+    for (int i = 0; i < n; i++) {
+        const struct sample *s = &samples[i];
+        if (!s->is_receiver)
+            continue;
+        int j = r->n++;
+        if (j % LANES == 0)
+            r->boxes[j / LANES] = empty;
+        r->sample[j] = i;
+        for (int k = 0; k < 3; k++) {
+            r->org[k][j] = s->org[k];
+            r->shading[k][j] = s->surface.normal_shading[k];
+            r->geometric[k][j] = s->surface.normal_geometric[k];
+        }
+        grow_box(&r->boxes[j / LANES], s->org);
+        grow_box(&r->box, s->org);
+    }
+    r->n_blocks = (r->n + LANES - 1) / LANES;
+    for (int j = r->n; j < r->n_blocks * LANES; j++) {
+        for (int k = 0; k < 3; k++)
+            r->org[k][j] = r->shading[k][j] = r->geometric[k][j] = 0;
+    }
+}
+
+/** surface_cosine() of a block's 16 receivers. */
+static void get_cosines(const struct receivers *r, int block, const float dir[static 3],
+                        float out[static LANES])
+{
+    const float *s[3];
+    const float *g[3];
+    for (int k = 0; k < 3; k++) {
+        s[k] = r->shading[k] + block * LANES;
+        g[k] = r->geometric[k] + block * LANES;
+    }
+    for (int i = 0; i < LANES; i++) {
+        float c = s[0][i] * dir[0] + s[1][i] * dir[1] + s[2][i] * dir[2];
+        float d = g[0][i] * dir[0] + g[1][i] * dir[1] + g[2][i] * dir[2];
+        c = d > 0 ? c : 0;
+        out[i] = c > 0 ? c : 0;
+    }
+}
+
+static void get_light_dir(const struct light_list *lights, int l, float out_dir[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        out_dir[k] = lights->dir[k][l];
+}
+
+/** Traces the packet; marks hidden lanes in masks[block][light]. */
+static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
+                  uint16_t (*masks)[GN_LIGHTS_MAX], struct tile_figures *figures)
 {
     int n;
-    uint32_t hidden = gn_packet_trace(frame, scratch, GN_RT_REAL, &n, &figures->rays_shadow);
-    figures->n_rays_real += (uint64_t)n;
+    uint32_t hidden = gn_packet_trace(frame, scratch, set, &n, &figures->rays_shadow);
+    if (set == GN_RT_REAL)
+        figures->n_rays_real += (uint64_t)n;
     for (int lane = 0; lane < n; lane++) {
-        if (!(hidden >> lane & 1))
-            add_light(frame, scratch, scratch->lane_sample[lane], scratch->lane_light[lane],
-                      scratch->lane_weight[lane]);
+        int j = scratch->lane_sample[lane];
+        if (hidden >> lane & 1)
+            masks[j / LANES][scratch->lane_light[lane]] |= (uint16_t)(1u << (j % LANES));
     }
 }
 
-/** U and S of those of the m samples that are cut (or whose pixel is). */
-static void sum_lights(const struct frame *frame, struct scratch *scratch, int m,
-                       const bool *groups, struct tile_figures *figures)
+/** Rays of a block's lanes to one light. */
+static void trace_block(const struct frame *frame, struct scratch *scratch, int block, int light,
+                        const float dir[static 3], enum gn_rt_set set,
+                        uint16_t (*masks)[GN_LIGHTS_MAX], struct tile_figures *figures)
+{
+    const struct receivers *r = &scratch->receivers;
+    float cosines[LANES];
+    get_cosines(r, block, dir, cosines);
+    for (int i = 0; i < LANES; i++) {
+        int j = block * LANES + i;
+        const float org[3] = {r->org[0][j], r->org[1][j], r->org[2][j]};
+        if (!(cosines[i] > 0) || (set == GN_RT_REAL && !(r->wanted[block] >> i & 1)))
+            continue;
+        if (frame->cull && set == GN_RT_VIRTUAL && !gn_box_may_meet(&frame->virtual_box, org, dir))
+            continue;
+        if (gn_packet_add(scratch, org, dir, j, light, 0))
+            flush(frame, scratch, set, masks, figures);
+    }
+}
+
+/** Which lights do virtual objects hide? */
+static void find_cut(const struct frame *frame, struct scratch *scratch,
+                     struct tile_figures *figures)
 {
     const struct light_list *lights = frame->lights;
+    const struct receivers *r = &scratch->receivers;
     for (int l = 0; l < lights->n; l++) {
-        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-        for (int j = 0; j < m; j++) {
-            const struct sample *s = &scratch->samples[scratch->lit[j]];
-            if (!groups[s->group])
-                continue;
-            float w = weigh_light(frame, &s->surface, dir);
-            if (!(w > 0))
-                continue;
-            if (!frame->run_blockers)
-                add_light(frame, scratch, j, l, w);
-            else if (gn_packet_add(scratch, s->org, dir, j, l, w))
-                flush_real(frame, scratch, figures);
+        float dir[3];
+        get_light_dir(lights, l, dir);
+        if (frame->cull && !gn_box_may_meet_from_box(&frame->virtual_box, &r->box, dir))
+            continue;
+        for (int b = 0; b < r->n_blocks; b++) {
+            if (!frame->cull || gn_box_may_meet_from_box(&frame->virtual_box, &r->boxes[b], dir))
+                trace_block(frame, scratch, b, l, dir, GN_RT_VIRTUAL, scratch->cut, figures);
         }
     }
-    flush_real(frame, scratch, figures);
+    flush(frame, scratch, GN_RT_VIRTUAL, scratch->cut, figures);
+    for (int b = 0; b < r->n_blocks; b++) {
+        unsigned any = 0;
+        for (int l = 0; l < lights->n; l++)
+            any |= scratch->cut[b][l];
+        for (int i = 0; i < LANES; i++) {
+            if (any >> i & 1)
+                scratch->samples[r->sample[b * LANES + i]].is_cut = true;
+        }
+    }
+}
+
+/** True where the box lies under the planes through all wanted receivers' ray origins: no ray that
+ * leaves upwards meets it. */
+static bool is_box_under(const struct receivers *r, const struct box *box)
+{
+    for (int j = 0; j < r->n; j++) {
+        if (!(r->wanted[j / LANES] >> (j % LANES) & 1))
+            continue;
+        double highest = 0;
+        for (int k = 0; k < 3; k++) {
+            double n = r->geometric[k][j];
+            highest += n * ((double)(n > 0 ? box->max[k] : box->min[k]) - r->org[k][j]);
+        }
+        if (highest > 0)
+            return false;
+    }
+    return true;
+}
+
+/** Which lights do real objects hide from the wanted receivers? */
+static void find_hidden(const struct frame *frame, struct scratch *scratch,
+                        struct tile_figures *figures)
+{
+    const struct light_list *lights = frame->lights;
+    const struct receivers *r = &scratch->receivers;
+    const struct box *boxes[MAX_BLOCKERS];
+    int n_boxes = 0;
+    for (int i = 0; i < frame->n_blockers && frame->cull; i++) {
+        if (!is_box_under(r, &frame->blockers[i]))
+            boxes[n_boxes++] = &frame->wide_blockers[i];
+    }
+    for (int l = 0; l < lights->n; l++) {
+        const struct box *near[MAX_BLOCKERS];
+        int n_near = 0;
+        float dir[3];
+        get_light_dir(lights, l, dir);
+        for (int i = 0; i < n_boxes; i++) {
+            if (gn_box_may_meet_from_box(boxes[i], &r->box, dir))
+                near[n_near++] = boxes[i];
+        }
+        for (int b = 0; b < r->n_blocks && (n_near > 0 || !frame->cull); b++) {
+            bool may_hide = !frame->cull;
+            for (int i = 0; i < n_near && !may_hide; i++)
+                may_hide = gn_box_may_meet_from_box(near[i], &r->boxes[b], dir);
+            if (may_hide && r->wanted[b])
+                trace_block(frame, scratch, b, l, dir, GN_RT_REAL, scratch->hidden, figures);
+        }
+    }
+    flush(frame, scratch, GN_RT_REAL, scratch->hidden, figures);
+}
+
+/** U and S of a block's receivers. */
+static void sum_block(const struct frame *frame, struct scratch *scratch, int block)
+{
+    const struct light_list *lights = frame->lights;
+    const struct receivers *r = &scratch->receivers;
+    double open[2][3][LANES] = {{{0}}};
+    double cut[2][3][LANES] = {{{0}}};
+    for (int l = 0; l < lights->n; l++) {
+        float dir[3];
+        float w[LANES];
+        get_light_dir(lights, l, dir);
+        get_cosines(r, block, dir, w);
+        unsigned hidden = scratch->hidden[block][l];
+        unsigned is_cut = scratch->cut[block][l];
+        for (int i = 0; i < LANES && (hidden || frame->options.shadow_unweighted); i++)
+            w[i] = !(w[i] > 0) || (hidden >> i & 1)   ? 0
+                   : frame->options.shadow_unweighted ? 1
+                                                      : w[i];
+        for (int k = 0; k < 3; k++) {
+            double irradiance = lights->irradiance[k][l];
+            double *sum = open[l & 1][k];
+            for (int i = 0; i < LANES; i++)
+                sum[i] += irradiance * (double)w[i];
+            for (int i = 0; i < LANES && is_cut; i++) {
+                if (is_cut >> i & 1)
+                    cut[l & 1][k][i] += irradiance * (double)w[i];
+            }
+        }
+    }
+    for (int i = 0; i < LANES; i++) {
+        if (!(r->wanted[block] >> i & 1))
+            continue;
+        struct sample *s = &scratch->samples[r->sample[block * LANES + i]];
+        for (int k = 0; k < 6; k++) {
+            s->open[k / 3][k % 3] = open[k / 3][k % 3][i];
+            s->cut[k / 3][k % 3] = cut[k / 3][k % 3][i];
+        }
+    }
 }
 
 void gn_shadow_find_groups(const struct frame *frame, const struct sample *samples, int n,
@@ -158,25 +275,39 @@ void gn_shadow_clear(struct sample *s)
 void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n,
                        struct tile_figures *figures)
 {
+    struct receivers *r = &scratch->receivers;
     bool groups[BATCH];
-    int m = 0;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++)
         gn_shadow_clear(&scratch->samples[i]);
-        if (scratch->samples[i].is_receiver)
-            scratch->lit[m++] = i;
-    }
-    if (m == 0)
+    gather_receivers(scratch->samples, n, r);
+    if (r->n == 0)
         return;
-    find_blocked(frame, scratch, m, figures);
+    for (int b = 0; b < r->n_blocks; b++) {
+        memset(scratch->cut[b], 0, (size_t)frame->lights->n * sizeof(uint16_t));
+        memset(scratch->hidden[b], 0, (size_t)frame->lights->n * sizeof(uint16_t));
+        r->wanted[b] = 0;
+    }
+    find_cut(frame, scratch, figures);
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
-    sum_lights(frame, scratch, m, groups, figures);
+    bool is_any_wanted = false;
+    for (int j = 0; j < r->n; j++) {
+        bool is_wanted = groups[scratch->samples[r->sample[j]].group];
+        r->wanted[j / LANES] |= (uint16_t)(is_wanted << (j % LANES));
+        is_any_wanted |= is_wanted;
+    }
+    if (!is_any_wanted)
+        return;
+    if (frame->run_blockers)
+        find_hidden(frame, scratch, figures);
+    for (int b = 0; b < r->n_blocks; b++) {
+        if (r->wanted[b])
+            sum_block(frame, scratch, b);
+    }
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
-        if (!groups[s->group])
-            continue;
-        if (s->is_receiver)
+        if (groups[s->group] && s->is_receiver)
             gn_shadow_weigh(frame, s);
-        else if (s->kind != SAMPLE_VIRTUAL)
+        else if (groups[s->group] && s->kind != SAMPLE_VIRTUAL)
             gn_shadow_see_nothing(frame, s);
     }
 }
