@@ -202,6 +202,21 @@ static void samples_are_taken_at_the_level_required(void **unused)
     assert_true(n_seen >= 9);
 }
 
+static void a_code_equal_to_the_importance_is_no_sample(void **unused)
+{
+    (void)unused;
+    static struct even even;
+    int n_nearest = 0;
+    for (int m = 1; m < 400; m++) {
+        sample_even(&even, m);
+        for (int i = 0; i < even.n; i++) {
+            assert_true(even.samples[i].code < (uint64_t)m);
+            n_nearest += even.samples[i].code == (uint64_t)m - 1;
+        }
+    }
+    assert_true(n_nearest > 0);
+}
+
 static void levels_are_exact_at_fibonacci_numbers(void **unused)
 {
     (void)unused;
@@ -256,6 +271,7 @@ int main(void)
         cmocka_unit_test(samples_nest),
         cmocka_unit_test(density_is_known),
         cmocka_unit_test(samples_are_taken_at_the_level_required),
+        cmocka_unit_test(a_code_equal_to_the_importance_is_no_sample),
         cmocka_unit_test(levels_are_exact_at_fibonacci_numbers),
         cmocka_unit_test(a_hot_texel_gets_its_share),
     };
