@@ -187,9 +187,8 @@ static void each_reading_can_be_mended(void **unused)
             assert_true(n_different > 0);
     }
     /* Every reading mended, with the logarithm: the energy partition in the seed's division. */
-    struct gn_light_options all = {.method = GN_LIGHT_PARTITION_SEED,
-                                   .mended = GN_READ_ALL,
-                                   .metric = GN_METRIC_LOG2};
+    struct gn_light_options all = {
+        .method = GN_LIGHT_PARTITION_SEED, .mended = GN_READ_ALL, .metric = GN_METRIC_LOG2};
     struct gn_lighting_state *state = make_state(&f, &all);
     check_energy(state, 1e-5);
     gn_lighting_state_unref(&state);
@@ -269,6 +268,14 @@ static void a_disc_light_has_its_radius(void **unused)
     assert_int_equal(state->n_lights, 1);
     assert_near(state->lights[0].angular_radius, 8 * pi / 180, 0.01 * 8 * pi / 180);
     assert_near(state->lights[0].dir_world[0], 0.70711, 1e-3);
+    gn_lighting_state_unref(&state);
+
+    for (int i = 0; i < 3 * 400 * 400; i++) // one texel: a disc of its solid angle
+        f.image.data[i] = i == 3 * (150 * 400 + 170);
+    double radius = sqrt(gn_projection_get_solid_angle(&f.frame.projection, 170, 150) / pi);
+    assert_int_equal(
+        gn_lighting_state_create(&f.frame, &map_options, &options, NULL, &state, &error), 0);
+    assert_near(state->lights[0].angular_radius, radius, 0.02 * radius);
     gn_lighting_state_unref(&state);
     light_fixture_finish(&f);
 }

@@ -78,10 +78,10 @@ static void what_is_no_light_is_mended_and_counted(void **unused)
     gn_image_at(&f.image, 63, 16)[2] = 3;
     gn_image_at(&f.image, 1, 15)[2] = INFINITY; // no help
     gn_image_at(&f.image, 40, 9)[0] = 3e38f;
-    for (int i = 0; i < 6; i++) // of (51, 21) only the three below are left
+    for (int i = 0; i < 6; i++) // of (51, 20) only the three above are left
         gn_image_at(&f.image, 50 + i % 3, 20 + i / 3)[0] = INFINITY;
     struct gn_radiance_map *map = make_map(&f, NULL);
-    assert_true(gn_image_at(&map->radiance, 51, 21)[0] == 1);
+    assert_true(gn_image_at(&map->radiance, 51, 20)[0] == 1);
     assert_int_equal(map->figures.n_nan, 1);
     assert_int_equal(map->figures.n_negative, 1);
     assert_int_equal(map->figures.n_inf, 8);
