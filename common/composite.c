@@ -3,10 +3,26 @@
 #include "common/composite.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stddef.h>
+#include <stdint.h>
+#include <string.h>
 
 /* Rows that one worker takes at a time. */
 #define ROWS 16
+/* A positive float's bits over this shift: its exponent and 6 bits of mantissa, steps of 1/64. */
+#define GUIDE_SHIFT 17
+#define GUIDE_SIZE (1 << (31 - GUIDE_SHIFT))
+
+/*
+ * Linear values to 8-bit codes without evaluating the curve: code k begins at edges[k], and a guide
+ * says where to begin looking. The same codes as gn_response_encode and rounding, up to the float
+ * spacing at an edge.
+ */
+struct encoder {
+    float edges[257];          // [0] 0, [256] infinity
+    uint8_t guide[GUIDE_SIZE]; // the code of the smallest float of the bucket
+};
 
 /* One picture's work, shared by all workers. */
 struct job {
@@ -16,7 +32,9 @@ struct job {
     const struct gn_response *response;
     bool encoded_multiply;
     float linear[256];              // the response's curve at every code
-    struct gn_response matrix_only; // the response's matrix and scale
+    double radiance_from_device[9]; // row-major; the response's matrix and scale
+    double device_from_radiance[9];
+    struct encoder encoder;
     struct gn_image8 *out_codes;
     const struct gn_image *radiance;
     struct gn_image *out_radiance;
@@ -50,9 +68,38 @@ static void blend(const struct touch *t, float rgb[static 3])
         rgb[c] = (rgb[c] + t->added[c]) * (1 - t->rgba[3]) + t->rgba[c];
 }
 
-static uint8_t to_code8(float code)
+static uint32_t get_bits(float value)
 {
-    return (uint8_t)(code * 255 + 0.5f); // code is in [0, 1]
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof(bits));
+    return bits;
+}
+
+static void init_encoder(const struct gn_response *response, struct encoder *out)
+{
+    out->edges[0] = 0;
+    for (int k = 1; k < 256; k++)
+        out->edges[k] = gn_response_decode(response, ((float)k - 0.5f) / 255);
+    out->edges[256] = INFINITY;
+    int code = 0;
+    for (uint32_t i = 0; i < GUIDE_SIZE; i++) {
+        uint32_t bits = i << GUIDE_SHIFT;
+        float smallest;
+        memcpy(&smallest, &bits, sizeof(smallest));
+        while (code < 255 && smallest >= out->edges[code + 1]) // false for the NaNs at the end
+            code++;
+        out->guide[i] = (uint8_t)code;
+    }
+}
+
+static uint8_t encode(const struct encoder *encoder, float linear)
+{
+    if (!(linear > 0)) // NaN too
+        return encoder->guide[0];
+    int code = encoder->guide[get_bits(linear) >> GUIDE_SHIFT];
+    while (code < 255 && linear >= encoder->edges[code + 1])
+        code++;
+    return (uint8_t)code;
 }
 
 static void blend_codes8(const struct job *job, const struct touch *t, const uint8_t *in,
@@ -63,14 +110,14 @@ static void blend_codes8(const struct job *job, const struct touch *t, const uin
         rgb[c] = job->encoded_multiply
                      ? gn_response_decode(job->response, (float)in[c] / 255 * t->shadow[c])
                      : job->linear[in[c]];
-    gn_response_to_radiance(&job->matrix_only, rgb, 1);
+    gn_response_multiply(job->radiance_from_device, rgb);
     if (!job->encoded_multiply)
         for (int c = 0; c < 3; c++)
             rgb[c] *= t->shadow[c];
     blend(t, rgb);
-    gn_response_from_radiance(job->response, rgb, 1);
+    gn_response_multiply(job->device_from_radiance, rgb);
     for (int c = 0; c < 3; c++)
-        out[c] = to_code8(rgb[c]);
+        out[c] = encode(&job->encoder, rgb[c]);
 }
 
 static void composite_codes8_rows(void *context, int item, int worker)
@@ -137,10 +184,10 @@ int gn_composite_image8(const struct gn_composite_layers *layers,
                       .height = height,
                       .codes = background,
                       .response = response,
-                      .matrix_only = *response,
                       .encoded_multiply = encoded_multiply,
                       .out_codes = out};
-    job.matrix_only.type = GN_RESPONSE_LINEAR;
+    gn_response_get_matrices(response, job.radiance_from_device, job.device_from_radiance);
+    init_encoder(response, &job.encoder);
     for (int i = 0; i < 256; i++)
         job.linear[i] = gn_response_decode(response, (float)i / 255);
     gn_pool_run(pool, (height + ROWS - 1) / ROWS, composite_codes8_rows, &job);

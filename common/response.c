@@ -169,7 +169,7 @@ float gn_response_encode(const struct gn_response *response, float linear)
     return (float)fmin(fmax(code, 0), 1);
 }
 
-static void multiply(const double m[static 9], float rgb[static 3])
+void gn_response_multiply(const double m[static 9], float rgb[static 3])
 {
     double r = (double)rgb[0], g = (double)rgb[1], b = (double)rgb[2];
     for (int i = 0; i < 3; i++) {
@@ -178,37 +178,39 @@ static void multiply(const double m[static 9], float rgb[static 3])
     }
 }
 
-/* Device RGB to Rec.709 radiance: matrix times scale. False where both are 1. */
-static bool get_matrix(const struct gn_response *response, double out_m[static 9])
+bool gn_response_get_matrices(const struct gn_response *response,
+                              double out_radiance_from_device[static 9],
+                              double out_device_from_radiance[static 9])
 {
     bool is_identity = is_all_zero(response->to_rec709);
     double scale = response->scale == 0 ? 1 : response->scale;
     for (int i = 0; i < 9; i++)
-        out_m[i] = scale * (is_identity ? identity[i] : response->to_rec709[i]);
+        out_radiance_from_device[i] = scale * (is_identity ? identity[i] : response->to_rec709[i]);
+    if (!invert_matrix(out_radiance_from_device, out_device_from_radiance))
+        memcpy(out_device_from_radiance, identity,
+               sizeof(identity)); // gn_response_check refuses it
     return !(is_identity && scale == 1);
 }
 
 void gn_response_to_radiance(const struct gn_response *response, float *rgb, long n)
 {
-    double m[9];
-    bool has_matrix = get_matrix(response, m);
+    double m[9], inverse[9];
+    bool has_matrix = gn_response_get_matrices(response, m, inverse);
     for (long i = 0; i < n; i++) {
         for (int c = 0; c < 3; c++)
             rgb[3 * i + c] = gn_response_decode(response, rgb[3 * i + c]);
         if (has_matrix)
-            multiply(m, rgb + 3 * i);
+            gn_response_multiply(m, rgb + 3 * i);
     }
 }
 
 void gn_response_from_radiance(const struct gn_response *response, float *rgb, long n)
 {
     double m[9], inverse[9];
-    bool has_matrix = get_matrix(response, m);
-    if (has_matrix && !invert_matrix(m, inverse)) // a response that gn_response_check refuses
-        memcpy(inverse, identity, sizeof(inverse));
+    bool has_matrix = gn_response_get_matrices(response, m, inverse);
     for (long i = 0; i < n; i++) {
         if (has_matrix)
-            multiply(inverse, rgb + 3 * i);
+            gn_response_multiply(inverse, rgb + 3 * i);
         for (int c = 0; c < 3; c++)
             rgb[3 * i + c] = gn_response_encode(response, rgb[3 * i + c]);
     }

@@ -61,4 +61,15 @@ void gn_response_to_radiance(const struct gn_response *response, float *rgb, lon
 /** The inverse: Rec.709 radiance to codes in [0, 1]. rgb[n][3], in place. */
 void gn_response_from_radiance(const struct gn_response *response, float *rgb, long n);
 
+/**
+ * The linear half of a response: row-major matrix times scale, device RGB to Rec.709 radiance, and
+ * its inverse. Returns whether the two are anything but 1. Thread-safety: safe.
+ */
+bool gn_response_get_matrices(const struct gn_response *response,
+                              double out_radiance_from_device[static 9],
+                              double out_device_from_radiance[static 9]);
+
+/** rgb = m rgb, negatives and NaN clamped to 0. */
+void gn_response_multiply(const double m[static 9], float rgb[static 3]);
+
 #endif
