@@ -129,6 +129,36 @@ static void test_formula(void **state)
     gn_image_finish(&out);
 }
 
+/* Codes come from a table of edges: they are those of the curve, rounded, for every response. */
+static void test_codes_of_curves(void **state)
+{
+    struct fixture *f = *state;
+    static const struct gn_response responses[] = {
+        {.type = GN_RESPONSE_LINEAR, .scale = 3},
+        {.type = GN_RESPONSE_SRGB},
+        {.type = GN_RESPONSE_SRGB, .to_rec709 = {0.8, 0.2, 0, 0.1, 0.9, 0, 0, 0.3, 0.7}},
+        {.type = GN_RESPONSE_GAMMA, .gamma = 2.4},
+        {.type = GN_RESPONSE_LOG, .log_a = 0.8, .log_b = 0.06, .log_c = 1e-5},
+    };
+    for (size_t r = 0; r < sizeof(responses) / sizeof(responses[0]); r++) {
+        for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+            f->rgba.data[i / 3 * 4 + 3] = 1;
+            // Seven decades, and what lies beyond both ends.
+            f->rgba.data[i / 3 * 4 + i % 3] = i < 9 ? 0 : powf(10, (float)(i % 701) / 100 - 6);
+        }
+        assert_int_equal(
+            gn_composite_image8(&f->layers, &f->background, &responses[r], false, NULL, &f->out),
+            0);
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            float rgb[3];
+            memcpy(rgb, f->rgba.data + 4 * i, sizeof(rgb));
+            gn_response_from_radiance(&responses[r], rgb, 1);
+            for (int c = 0; c < 3; c++)
+                assert_true(fabsf(rgb[c] * 255 - f->out.data[3 * i + c]) <= 0.5001f);
+        }
+    }
+}
+
 static void test_refusals(void **state)
 {
     struct fixture *f = *state;
@@ -152,6 +182,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_untouched, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_shadow_on_srgb, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_formula, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_codes_of_curves, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_refusals, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
