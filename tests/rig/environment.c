@@ -214,7 +214,7 @@ bool gn_rig_environment_sample(const struct gn_rig_environment *env, const doubl
         s.distance = vec_length(to);
         vec_scale(to, 1 / s.distance, s.dir);
     }
-    s.pdf_solid_angle = get_texel_pdf(env, x, y) / get_view_ratio(env, seen, s.dir, s.distance);
+    s.pdf_solid_angle = get_texel_pdf(env, x, y) * get_view_ratio(env, seen, s.dir, s.distance);
     for (int k = 0; k < 3; k++)
         s.radiance[k] = gn_image_at(&env->map, x, y)[k];
     *out_sample = s;
@@ -229,7 +229,7 @@ double gn_rig_environment_get_pdf(const struct gn_rig_environment *env,
     if (!see_light(env, point, dir, seen, &distance))
         return 0;
     find_texel(env, seen, &x, &y);
-    return get_texel_pdf(env, x, y) / get_view_ratio(env, seen, dir, distance);
+    return get_texel_pdf(env, x, y) * get_view_ratio(env, seen, dir, distance);
 }
 
 void gn_rig_environment_get_irradiance(const struct gn_rig_environment *env,

@@ -137,8 +137,9 @@ static void add_body_band(struct gn_mesh *mesh, int band, int along, int around)
     add_band(mesh, first, along, around, top_pole, bottom_pole);
 }
 
-/* A fan over the closed ring of vertices that starts at `ring`, facing `facing`. */
-static void add_cap(struct gn_mesh *mesh, uint32_t ring, int around, const double facing[static 3])
+/* A fan over the closed ring of vertices that starts at `ring`, facing the side from which the ring
+ * runs counter-clockwise, or with `turned` the other. */
+static void add_cap(struct gn_mesh *mesh, uint32_t ring, int around, bool turned)
 {
     double p[3][3], e1[3], e2[3], n[3];
     uint32_t first = (uint32_t)mesh->n_vertices;
@@ -149,7 +150,6 @@ static void add_cap(struct gn_mesh *mesh, uint32_t ring, int around, const doubl
     vec_subtract(p[2], p[0], e2);
     vec_cross(e1, e2, n);
     vec_normalize(n);
-    bool turned = vec_dot(n, facing) < 0;
     if (turned)
         vec_scale(n, -1, n);
     for (int j = 0; j < around; j++) {
@@ -163,10 +163,9 @@ static void add_cap(struct gn_mesh *mesh, uint32_t ring, int around, const doubl
 }
 
 /* Handle or spout: two patches of half sections, mirrored at y = 0, closed by caps. The published
- * rows run so that du x dv points out of the half y <= 0 of the spout and of the handle alike up to
- * one sign, `side`. */
+ * rows of both run so that du x dv points inwards. */
 static void add_tube(struct gn_mesh *mesh, const double patches[static 2][4][4][3], int along,
-                     int around, double side)
+                     int around)
 {
     uint32_t first = (uint32_t)mesh->n_vertices;
     int half = around / 2, rows = 2 * along;
@@ -176,7 +175,7 @@ static void add_tube(struct gn_mesh *mesh, const double patches[static 2][4][4][
             int patch = i < along ? 0 : 1, across = j <= half ? j : around - j;
             evaluate_surface(patches[patch], (double)(i - patch * along) / along,
                              (double)across / half, p, n);
-            vec_scale(n, side, n);
+            vec_scale(n, -1, n);
             if (j > half)
                 p[1] = -p[1], n[1] = -n[1];
             if (j == 0 || j == half)
@@ -186,16 +185,13 @@ static void add_tube(struct gn_mesh *mesh, const double patches[static 2][4][4][
         }
     int first_triangle = mesh->n_triangles;
     add_band(mesh, first, rows, around, false, false);
-    for (int t = first_triangle; side < 0 && t < mesh->n_triangles; t++) {
+    for (int t = first_triangle; t < mesh->n_triangles; t++) {
         uint32_t *tri = mesh->triangles + 3 * (size_t)t, swap = tri[1];
         tri[1] = tri[2];
         tri[2] = swap;
     }
-    double start[3], end[3];
-    vec_subtract(patches[0][0][0], patches[0][1][0], start);
-    vec_subtract(patches[1][3][0], patches[1][2][0], end);
-    add_cap(mesh, first, around, start);
-    add_cap(mesh, first + (uint32_t)(rows * around), around, end);
+    add_cap(mesh, first, around, true);
+    add_cap(mesh, first + (uint32_t)(rows * around), around, false);
 }
 
 static bool in_range(int value, int low, int high, int multiple)
@@ -226,8 +222,8 @@ int gn_rig_teapot_create(const struct gn_rig_teapot_options *o, struct gn_mesh *
     }
     for (int b = 0; b < GN_RIG_TEAPOT_BANDS; b++)
         add_body_band(&mesh, b, o->along[b], o->around);
-    add_tube(&mesh, gn_rig_teapot_handle, o->handle_along, o->tube_around, -1);
-    add_tube(&mesh, gn_rig_teapot_spout, o->spout_along, o->tube_around, 1);
+    add_tube(&mesh, gn_rig_teapot_handle, o->handle_along, o->tube_around);
+    add_tube(&mesh, gn_rig_teapot_spout, o->spout_along, o->tube_around);
     *out_mesh = mesh;
     return 0;
 }

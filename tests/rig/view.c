@@ -7,7 +7,9 @@
 
 #include "tests/rig/vec.h"
 
-#define PROBE_POINTS 16
+/* Points along a pixel's side: few where they see the same, many where they differ. */
+#define FEW_POINTS 4
+#define MANY_POINTS 16
 
 /* Brown and Conrady: where the lens puts the ideal point p. */
 static void distort(const double d[static 5], const double p[static 2], double out[static 2])
@@ -80,23 +82,32 @@ static bool see_point(const struct probe_job *job, double x, double y, double ou
     return true;
 }
 
+/* Mean over n x n points of a pixel; false where they differ by more than a quarter. */
+static bool take_pixel(const struct probe_job *job, int x, int y, int n, float out_rgb[static 3])
+{
+    double sum[3] = {0}, count = 0, low = INFINITY, high = 0, rgb[3];
+    for (int i = 0; i < n * n; i++) {
+        if (!see_point(job, x + (i % n + 0.5) / n, y + (i / n + 0.5) / n, rgb))
+            continue;
+        count++;
+        for (int k = 0; k < 3; k++)
+            sum[k] += rgb[k];
+        low = fmin(low, rgb[0] + rgb[1] + rgb[2]);
+        high = fmax(high, rgb[0] + rgb[1] + rgb[2]);
+    }
+    for (int k = 0; k < 3; k++)
+        out_rgb[k] = count > 0 ? (float)(sum[k] / count) : 0;
+    return high <= 1.25 * low;
+}
+
 static void take_row(void *context, int y, int worker)
 {
     const struct probe_job *job = context;
     (void)worker;
     for (int x = 0; x < job->image->width; x++) {
-        double sum[3] = {0}, n = 0, rgb[3];
-        for (int i = 0; i < PROBE_POINTS * PROBE_POINTS; i++) {
-            double px = x + (i % PROBE_POINTS + 0.5) / PROBE_POINTS;
-            double py = y + (i / PROBE_POINTS + 0.5) / PROBE_POINTS;
-            if (!see_point(job, px, py, rgb))
-                continue;
-            n++;
-            for (int k = 0; k < 3; k++)
-                sum[k] += rgb[k];
-        }
-        for (int k = 0; k < 3 && n > 0; k++)
-            gn_image_at(job->image, x, y)[k] = (float)(sum[k] / n);
+        float *rgb = gn_image_at(job->image, x, y);
+        if (!take_pixel(job, x, y, FEW_POINTS, rgb))
+            (void)take_pixel(job, x, y, MANY_POINTS, rgb);
     }
 }
 

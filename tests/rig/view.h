@@ -40,7 +40,8 @@ enum gn_rig_probe {
 
 /**
  * What a probe at `position` sees of the environment: each pixel the mean radiance over the part of
- * it that lies in the circle, from 16 x 16 points; 0 outside. world_from_probe: 3x3, row-major.
+ * it that lies in the circle, from 4 x 4 points, 16 x 16 where those differ; 0 outside.
+ * world_from_probe: 3x3, row-major.
  */
 GN_MUST_USE int gn_rig_take_probe(const struct gn_rig_environment *env, enum gn_rig_probe probe,
                                   int size, const double world_from_probe[static 9],
