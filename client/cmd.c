@@ -11,6 +11,9 @@
 
 #include "common/clock.h"
 
+/** Lateness that a replay catches up. */
+#define MAX_LATE_NS (2 * GN_NS_PER_S)
+
 int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
                 struct gn_options **out_options)
 {
@@ -37,10 +40,29 @@ int gn_cmd_fail(const struct gn_program *program, const char *sentence)
     return 1;
 }
 
+/** What to look at, where connecting failed in one of the ways that newcomers meet. */
+static const char *get_hint(int err)
+{
+    switch (err) {
+    case -ECONNREFUSED:
+        return "; is gnomond running, and is this the address that it listens at?";
+    case -ETIMEDOUT:
+    case -EPROTO:
+        return "; is this gnomond's address for clients (listen), not that of its page (http)?";
+    default:
+        return "";
+    }
+}
+
 int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
-                   enum gn_msg_role role, struct gn_client **out_client)
+                   enum gn_msg_role role, struct gn_client **out_client, struct gn_error *out_error)
 {
     struct gn_address server = gn_options_get_address(options, NULL, NULL, "server");
+    const char *text = gn_options_get_string(options, NULL, NULL, "server");
+    *out_client = NULL;
+    if (server.port == 0)
+        return gn_error_set(out_error, -EINVAL, "--server %s: a server's port is in [1, 65535]",
+                            text);
     struct gn_client_options client_options = {
         .host = server.host,
         .port = server.port,
@@ -52,13 +74,13 @@ int gn_cmd_connect(const struct gn_program *program, const struct gn_options *op
     };
     struct gn_wire_fault why = {{0}};
     int err = gn_client_connect(&client_options, out_client, &why);
-    if (err) {
-        gn_cmd_fail(program, why.text);
-        return err;
-    }
+    if (err && strstr(why.text, server.host))
+        return gn_error_set(out_error, err, "%s%s", why.text, get_hint(err));
+    if (err)
+        return gn_error_set(out_error, err, "%s: %s%s", text, why.text, get_hint(err));
     err = gn_client_sync_clock(*out_client, 8, 5000);
     if (err) {
-        gn_cmd_fail(program, gn_client_get_fault(*out_client));
+        gn_cmd_set_fault(*out_client, err, out_error);
         gn_client_destroy(out_client);
     }
     return err;
@@ -66,10 +88,47 @@ int gn_cmd_connect(const struct gn_program *program, const struct gn_options *op
 
 void gn_cmd_disconnect(struct gn_client **client)
 {
-    // The peer may be gone already; there is nothing left to lose.
-    if (*client && gn_client_bye(*client, GN_MSG_BYE_REASON_DONE) != 0)
-        fprintf(stderr, "the server was gone before goodbye\n");
+    // Where the peer is gone already there is nothing left to lose.
+    if (*client)
+        (void)!gn_client_bye(*client, GN_MSG_BYE_REASON_DONE);
     gn_client_destroy(client);
+}
+
+int gn_cmd_set_fault(const struct gn_client *client, int err, struct gn_error *out_error)
+{
+    const char *fault = gn_client_get_fault(client);
+    bool is_ours = err == -EDOM || err == -EMSGSIZE || err == -EINVAL;
+    return gn_error_set(out_error, err, "%s%s",
+                        is_ours ? "" : "the server is lost: ", *fault ? fault : strerror(-err));
+}
+
+int gn_cmd_take_event(const struct gn_client_event *event, struct gn_error *out_error)
+{
+    if (event->type == GN_WIRE_ERROR)
+        return gn_error_set(out_error, -EPROTO, "the server: %s", event->message.error.sentence);
+    if (event->type == GN_WIRE_BYE)
+        return gn_error_set(out_error, -ECONNRESET, "the server ended the session: %s",
+                            gn_wire_get_bye_text(event->message.bye.reason));
+    return 0;
+}
+
+int gn_cmd_keep_clock(struct gn_client *client, int64_t *measured_ns, struct gn_error *out_error)
+{
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    if (now_ns - *measured_ns < 60 * GN_NS_PER_S)
+        return 0;
+    *measured_ns = now_ns;
+    int err = gn_client_sync_clock(client, 4, 5000);
+    // A server too busy to answer now leaves us with the clock we have.
+    return err && err != -ETIMEDOUT ? gn_cmd_set_fault(client, err, out_error) : 0;
+}
+
+int gn_cmd_get_timeout_ms(int64_t due_ns)
+{
+    int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();
+    if (left_ns <= 0)
+        return 0;
+    return left_ns > 200 * GN_NS_PER_MS ? 200 : (int)(left_ns / GN_NS_PER_MS) + 1;
 }
 
 void gn_cmd_make_response(const struct gn_response *response, struct gn_msg_response *out)
@@ -96,27 +155,50 @@ void gn_cmd_make_transform(const struct gn_pose *pose, struct gn_msg_transform *
     memcpy(out->position_m, pose->translation, sizeof(pose->translation));
 }
 
-void gn_cmd_pace_init(struct gn_cmd_pace *pace, const struct gn_options *options,
-                      double default_rate_hz)
+void gn_cmd_pace_init(struct gn_cmd_pace *pace, const struct gn_program *program,
+                      const struct gn_options *options, double default_rate_hz)
 {
-    pace->start_ns = gn_clock_get_monotonic_ns();
-    if (gn_options_is_set(options, NULL, NULL, "start-at")) {
+    *pace = (struct gn_cmd_pace){.command = program->name};
+    pace->has_start = gn_options_is_set(options, NULL, NULL, "start-at");
+    if (pace->has_start) {
         double start_s = gn_options_get_double(options, NULL, NULL, "start-at");
-        pace->start_ns += (int64_t)(start_s * 1e9) - gn_clock_get_realtime_ns();
+        pace->start_ns =
+            gn_clock_get_monotonic_ns() + (int64_t)(start_s * 1e9) - gn_clock_get_realtime_ns();
     }
     pace->rate_hz = gn_options_is_set(options, NULL, NULL, "rate")
                         ? gn_options_get_double(options, NULL, NULL, "rate")
                         : default_rate_hz;
     pace->is_looped = gn_options_get_bool(options, NULL, NULL, "loop");
-    pace->n_wanted = gn_options_is_set(options, NULL, NULL, "count")
-                         ? gn_options_get_int(options, NULL, NULL, "count")
-                         : 0;
+    pace->n_wanted = gn_options_get_int(options, NULL, NULL, "count");
 }
 
-int64_t gn_cmd_pace_get_due_ns(const struct gn_cmd_pace *pace, long index, double time_s)
+int64_t gn_cmd_pace_get_due_ns(struct gn_cmd_pace *pace, long index, double time_s)
 {
     double since_start_s = pace->rate_hz > 0 ? (double)index / pace->rate_hz : time_s;
-    return pace->start_ns + (int64_t)llround(since_start_s * 1e9);
+    int64_t since_start_ns = (int64_t)llround(since_start_s * 1e9);
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    if (!pace->has_start) {
+        pace->has_start = true;
+        pace->start_ns = now_ns - since_start_ns;
+    }
+    int64_t late_ns = now_ns - (pace->start_ns + since_start_ns);
+    if (late_ns > (index == 0 ? 0 : MAX_LATE_NS)) {
+        if (index == 0)
+            fprintf(stderr, "%s: the time to start was %.1f s ago; starting now\n", pace->command,
+                    (double)late_ns * 1e-9);
+        pace->start_ns += late_ns;
+        pace->shifted_ns += late_ns;
+    } else if (index == 0 && late_ns < -GN_NS_PER_S) {
+        printf("starting in %.1f s\n", (double)-late_ns * 1e-9);
+        fflush(stdout);
+    }
+    return pace->start_ns + since_start_ns;
+}
+
+void gn_cmd_pace_print(const struct gn_cmd_pace *pace)
+{
+    if (pace->shifted_ns > 0)
+        printf(", %.1f s behind schedule", (double)pace->shifted_ns * 1e-9);
 }
 
 static atomic_bool is_interrupted; // atomic: set by the signal handler (lock-free), read anywhere

@@ -47,8 +47,8 @@ int gn_cmd_doctor(int argc, char *const argv[]);
          .flag = "files",                                                                          \
          .type = GN_OPTION_STRING,                                                                 \
          .value_name = "PATTERN",                                                                  \
-         .help = "Instead: a folder, or a pattern in quotes such as 'frames/*.png'; EXR, "         \
-                 "Radiance, PNG or JPEG, in the order of their names."},                           \
+         .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
+                 "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
         {.key = "rate",                                                                            \
          .flag = "rate",                                                                           \
          .type = GN_OPTION_DOUBLE,                                                                 \
@@ -56,15 +56,16 @@ int gn_cmd_doctor(int argc, char *const argv[]);
          .max = 1000,                                                                              \
          .value_name = "HZ",                                                                       \
          .help = "Pictures per second. Without it a sequence keeps its own times; files go at "    \
-                 "10."},                                                                           \
+                 "10. Up to 2 s late a replay catches up; beyond, the rest is shifted and said."}, \
         {.key = "start-at",                                                                        \
          .flag = "start-at",                                                                       \
          .type = GN_OPTION_DOUBLE,                                                                 \
          .min = 0,                                                                                 \
-         .max = 1e11,                                                                              \
+         .max = 9e9,                                                                               \
          .value_name = "TIME",                                                                     \
          .help = "When the first picture is sent, in seconds since 1970 (date +%s), so that a "    \
-                 "probe and a viewer can replay in step; default at once."},                       \
+                 "probe and a viewer can replay in step; default at once. Where it has passed, "   \
+                 "the replay says so and begins with its first picture all the same."},            \
         {.key = "loop",                                                                            \
          .flag = "loop",                                                                           \
          .type = GN_OPTION_BOOL,                                                                   \
@@ -85,13 +86,33 @@ int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
 /** "gnomon COMMAND: sentence" on stderr. Returns 1, the exit status. */
 int gn_cmd_fail(const struct gn_program *program, const char *sentence);
 
-/** Connects as --server, --room and --token say and synchronises the clock. 0, or said on stderr.
+/**
+ * Connects as --server, --room and --token say and synchronises the clock. Returns 0, or a negative
+ * errno and a sentence.
  */
-int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
-                   enum gn_msg_role role, struct gn_client **out_client);
+GN_MUST_USE int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
+                               enum gn_msg_role role, struct gn_client **out_client,
+                               struct gn_error *out_error);
 
-/** Ends the session politely and destroys the client. */
+/** Ends the session politely, if the server is still there, and destroys the client. NULL-safe. */
 void gn_cmd_disconnect(struct gn_client **client);
+
+/** The sentence for a call of libgnomon that failed. Returns err. */
+int gn_cmd_set_fault(const struct gn_client *client, int err, struct gn_error *out_error);
+
+/**
+ * What every command does with an event that is no answer: the server's ERROR or BYE ends it.
+ * Returns 0, or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_cmd_take_event(const struct gn_client_event *event, struct gn_error *out_error);
+
+/** Measures the clock again where that was a minute ago. Returns 0, or a negative errno and a
+ * sentence: the connection is lost. */
+GN_MUST_USE int gn_cmd_keep_clock(struct gn_client *client, int64_t *measured_ns,
+                                  struct gn_error *out_error);
+
+/** Milliseconds to wait in one gn_client_poll: until due_ns, but Ctrl-C must be seen meanwhile. */
+int gn_cmd_get_timeout_ms(int64_t due_ns);
 
 /** Camera responses and rigid poses as the wire has them. */
 void gn_cmd_make_response(const struct gn_response *response, struct gn_msg_response *out);
@@ -99,16 +120,25 @@ void gn_cmd_make_transform(const struct gn_pose *pose, struct gn_msg_transform *
 
 /** When picture after picture is due. */
 struct gn_cmd_pace {
-    int64_t start_ns; // own monotonic clock, of the first picture
+    const char *command; // said where the replay is late
+    bool has_start;
+    int64_t start_ns; // own monotonic clock, of the first picture; known once it is due
     double rate_hz;   // 0: the pictures' own times
     bool is_looped;
-    long n_wanted; // 0: all
+    long n_wanted;      // 0: all
+    int64_t shifted_ns; // by how much the schedule has been moved
 };
-/** From --rate, --start-at, --loop and --count; the start is now where --start-at is not given. */
-void gn_cmd_pace_init(struct gn_cmd_pace *pace, const struct gn_options *options,
-                      double default_rate_hz);
-/** When picture `index` (counted from 0) with time `time_s` is due, own monotonic clock. */
-int64_t gn_cmd_pace_get_due_ns(const struct gn_cmd_pace *pace, long index, double time_s);
+/** From --rate, --start-at, --loop and --count. */
+void gn_cmd_pace_init(struct gn_cmd_pace *pace, const struct gn_program *program,
+                      const struct gn_options *options, double default_rate_hz);
+/**
+ * When picture `index` (counted from 0) with time `time_s` is due, own monotonic clock. Without
+ * --start-at the first is due now. A first picture that is late at all, and a later one that is
+ * more than 2 s late, is due now and shifts all that follow, so that nothing bursts.
+ */
+int64_t gn_cmd_pace_get_due_ns(struct gn_cmd_pace *pace, long index, double time_s);
+/** ", N s behind its schedule" to stdout where it was shifted. */
+void gn_cmd_pace_print(const struct gn_cmd_pace *pace);
 
 /** From now on Ctrl-C and SIGTERM only set what gn_cmd_is_interrupted tells. */
 void gn_cmd_catch_signals(void);

@@ -40,10 +40,10 @@ static bool check_server(const struct gn_options *options)
     const char *server = gn_options_get_string(options, NULL, NULL, "server");
     char text[512];
     struct gn_client *client = NULL;
-    // A tracker: it needs no camera and costs the server nothing.
-    if (gn_cmd_connect(&program, options, GN_MSG_ROLE_TRACKER, &client) != 0) {
-        snprintf(text, sizeof(text), "%s does not serve us (the reason is above)", server);
-        say("FAILED", "server", text);
+    struct gn_error error = {0};
+    // A probe that sends nothing: it takes no viewer's place.
+    if (gn_cmd_connect(&program, options, GN_MSG_ROLE_PROBE, &client, &error) < 0) {
+        say("FAILED", "server", error.text);
         return false;
     }
     const struct gn_msg_welcome *w = gn_client_get_welcome(client);
@@ -59,7 +59,8 @@ static bool check_server(const struct gn_options *options)
              w->max_environment_height);
     say("ok", "limits", text);
     if (w->holdable_fps > 0)
-        snprintf(text, sizeof(text), "%.1f frames/s at 640x480 now", (double)w->holdable_fps);
+        snprintf(text, sizeof(text), "one more viewer gets %.1f frames/s at 640x480",
+                 (double)w->holdable_fps);
     else
         snprintf(text, sizeof(text), "not measured yet: no frame has been rendered in this room");
     say("ok", "rate", text);

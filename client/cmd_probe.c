@@ -15,6 +15,8 @@
 
 /** Pictures per second where neither the files nor --rate say. */
 #define DEFAULT_RATE_HZ 10.0
+/** How long the server's word on the last frame is waited for. */
+#define LAST_WORDS_NS (200 * GN_NS_PER_MS)
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
@@ -23,9 +25,10 @@ static const struct gn_option option_table[] = {
      .flag = "setup",
      .type = GN_OPTION_STRING,
      .value_name = "FILE",
-     .help = "What the files show and how: projection, response, orientation, position, as JSON "
-             "(docs/frames.md, \"Probe setup\"). Without it: a lat-long map of linear radiance. A "
-             "sequence brings its own."},
+     .help =
+         "What the files show and how: projection, response, orientation, position, as JSON "
+         "(docs/frames.md, \"Probe setup\"). Without it: a lat-long map of linear radiance, EXR or "
+         "Radiance. A sequence brings its own."},
     {.key = "projection",
      .flag = "projection",
      .type = GN_OPTION_ENUM,
@@ -34,9 +37,9 @@ static const struct gn_option option_table[] = {
      .help = "Instead of --setup, where everything else is at its default."},
     {.key = "first-sequence",
      .flag = "first-sequence",
-     .type = GN_OPTION_DOUBLE,
+     .type = GN_OPTION_INT,
      .min = 1,
-     .max = 9e15,
+     .max = 2e9,
      .default_value = "1",
      .value_name = "N",
      .help = "Number of the first environment frame; they count up. A viewer's --sync-light names "
@@ -95,6 +98,19 @@ static void make_frame(const struct gn_probe_setup *setup, struct gn_msg_environ
     gn_cmd_make_transform(&setup->world_from_probe, &out->world_from_probe);
 }
 
+/** What is wrong with the options together; NULL: nothing. */
+static const char *find_misuse(const struct gn_options *options)
+{
+    bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
+    bool has_setup = gn_options_is_set(options, NULL, NULL, "setup");
+    bool has_projection = gn_options_is_set(options, NULL, NULL, "projection");
+    if (has_dir == gn_options_is_set(options, NULL, NULL, "files"))
+        return "give --sequence DIR or --files PATTERN, one of them";
+    if (has_dir + has_setup + has_projection > 1)
+        return "the setup comes from --sequence, --setup or --projection, one of them";
+    return NULL;
+}
+
 /** Opens what --sequence or --files names, with its setup. */
 static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
                        struct gn_probe_setup *setup, struct gn_source **out,
@@ -104,13 +120,6 @@ static int open_source(const struct gn_options *options, const struct gn_cmd_pac
     const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
     const char *setup_path = gn_options_get_string(options, NULL, NULL, "setup");
     const char *projection = gn_options_get_string(options, NULL, NULL, "projection");
-    if (!dir == !pattern)
-        return gn_error_set(out_error, -EINVAL,
-                            "give --sequence DIR or --files PATTERN, one of them");
-    if ((dir && (setup_path || projection)) || (setup_path && projection))
-        return gn_error_set(
-            out_error, -EINVAL,
-            "the setup comes from --sequence, --setup or --projection, one of them");
     struct gn_sequence sequence = {0};
     struct gn_file_list list = {0};
     int err = 0;
@@ -130,8 +139,8 @@ static int open_source(const struct gn_options *options, const struct gn_cmd_pac
     }
     struct gn_file_source_options source_options = {
         .is_looped = pace->is_looped, .is_12_bit = setup->is_12_bit, .is_8_bit_16 = true};
-    if (!err)
-        err = gn_file_source_open(&list, &source_options, out);
+    if (!err && gn_file_source_open(&list, &source_options, out) < 0)
+        err = gn_error_set(out_error, -ENOMEM, "out of memory");
     gn_sequence_finish(&sequence);
     gn_file_list_finish(&list);
     return err;
@@ -158,94 +167,139 @@ static enum gn_msg_pixel_format get_pixel_format(enum gn_capture_format format)
     return GN_MSG_PIXEL_FORMAT_UNSPECIFIED;
 }
 
-/** Serves the connection until the time has come. 0, -EINTR (Ctrl-C), or the connection's error. */
-static int wait_until(struct gn_client *client, int64_t due_ns)
+/** Refuses what can be seen to be wrong before it is sent. */
+static int check_capture(const struct gn_probe_setup *setup, const struct gn_capture *capture,
+                         struct gn_error *out_error)
+{
+    struct gn_projection p = setup->projection;
+    const char *reason = NULL;
+    if (capture->format != GN_CAPTURE_RGB_F32 && !setup->has_response)
+        return gn_error_set(out_error, -EINVAL,
+                            "%s holds codes, not light: --setup must give their \"response\"",
+                            capture->name);
+    if ((p.width && p.width != capture->width) || (p.height && p.height != capture->height))
+        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the setup says %dx%d",
+                            capture->name, capture->width, capture->height, p.width, p.height);
+    p.width = capture->width;
+    p.height = capture->height;
+    if (gn_projection_init(&p, &reason) < 0)
+        return gn_error_set(out_error, -EINVAL, "%s (%dx%d): the projection does not fit: %s",
+                            capture->name, p.width, p.height, reason);
+    return 0;
+}
+
+/** One run of the command. */
+struct probe {
+    struct gn_client *client;
+    struct gn_source *source;
+    struct gn_probe_setup setup;
+    struct gn_msg_environment_frame frame; // what all have in common
+    uint64_t first_sequence;
+    int64_t clock_ns; // when the clock was measured
+    long n_sent;
+};
+
+/** Serves the connection until the time has come. 0, -EINTR (Ctrl-C), or an error and its sentence.
+ */
+static int wait_until(struct probe *p, int64_t due_ns, struct gn_error *out_error)
 {
     for (;;) {
         if (gn_cmd_is_interrupted())
             return -EINTR;
-        int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();
-        int timeout_ms = left_ns <= 0          ? 0
-                         : left_ns > 200000000 ? 200
-                                               : (int)(left_ns / 1000000) + 1;
+        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
         struct gn_client_event event;
-        int got = gn_client_poll(client, timeout_ms, &event);
-        if (got == -EINTR)
-            continue;
-        if (got < 0)
-            return got;
-        if (got > 0 && event.type == GN_WIRE_ERROR) {
-            fprintf(stderr, "gnomon probe: the server: %s\n", event.message.error.sentence);
-            if (event.message.error.fatal)
-                return -ECONNRESET;
-        }
-        if (got == 0 && left_ns <= 0)
-            return 0;
+        int got = gn_client_poll(p->client, timeout_ms, &event);
+        int err = got < 0   ? gn_cmd_set_fault(p->client, got, out_error)
+                  : got > 0 ? gn_cmd_take_event(&event, out_error)
+                            : gn_cmd_keep_clock(p->client, &p->clock_ns, out_error);
+        if (err || (got == 0 && timeout_ms == 0))
+            return err;
     }
 }
 
-static int send_all(struct gn_client *client, struct gn_source *source,
-                    const struct gn_cmd_pace *pace, struct gn_msg_environment_frame *frame)
+static int send_capture(struct probe *p, const struct gn_capture *capture,
+                        struct gn_error *out_error)
 {
-    uint64_t first = frame->sequence;
-    long n = 0;
-    for (; !pace->n_wanted || n < pace->n_wanted; n++) {
+    p->frame.sequence = p->first_sequence + (uint64_t)p->n_sent;
+    p->frame.capture_time_ns = gn_client_to_server_ns(p->client, gn_client_now_ns());
+    p->frame.width = (uint32_t)capture->width;
+    p->frame.height = (uint32_t)capture->height;
+    p->frame.pixel_format = get_pixel_format(capture->format);
+    int err = gn_client_send_environment(p->client, &p->frame, capture->data, capture->data_bytes);
+    if (err)
+        return gn_cmd_set_fault(p->client, err, out_error);
+    p->n_sent++;
+    printf("environment frame %llu: %s, %dx%d\n", (unsigned long long)p->frame.sequence,
+           capture->name, capture->width, capture->height);
+    fflush(stdout);
+    return 0;
+}
+
+static int stream(struct probe *p, struct gn_cmd_pace *pace, struct gn_error *out_error)
+{
+    while (!pace->n_wanted || p->n_sent < pace->n_wanted) {
         struct gn_capture capture;
-        struct gn_error error = {0};
-        int got = gn_source_read(source, &capture, &error);
+        int got = gn_source_read(p->source, &capture, out_error);
         if (got < 0)
-            return gn_cmd_fail(&program, error.text);
+            return got;
         if (got == 0)
             break;
-        int err = wait_until(client, gn_cmd_pace_get_due_ns(pace, n, capture.time_s));
-        if (err == -EINTR)
-            break;
-        frame->sequence = first + (uint64_t)n;
-        frame->capture_time_ns = gn_client_to_server_ns(client, gn_client_now_ns());
-        frame->width = (uint32_t)capture.width;
-        frame->height = (uint32_t)capture.height;
-        frame->pixel_format = get_pixel_format(capture.format);
+        int err = check_capture(&p->setup, &capture, out_error);
         if (!err)
-            err = gn_client_send_environment(client, frame, capture.data, capture.data_bytes);
+            err = wait_until(p, gn_cmd_pace_get_due_ns(pace, p->n_sent, capture.time_s), out_error);
+        if (!err)
+            err = send_capture(p, &capture, out_error);
         if (err)
-            return gn_cmd_fail(&program, gn_client_get_fault(client));
-        printf("environment frame %llu: %s, %dx%d\n", (unsigned long long)frame->sequence,
-               capture.name, capture.width, capture.height);
-        fflush(stdout);
+            return err;
     }
     // An ERROR about the last frame is on its way, if there is one.
-    int err = wait_until(client, gn_clock_get_monotonic_ns() + 200000000);
-    if (err && err != -EINTR)
-        return gn_cmd_fail(&program, gn_client_get_fault(client));
-    printf("%ld environment frames sent\n", n);
-    return 0;
+    return wait_until(p, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
+}
+
+/** Runs with everything open; the exit status. */
+static int run(struct probe *p, struct gn_cmd_pace *pace)
+{
+    struct gn_error error = {0};
+    int err = stream(p, pace, &error);
+    bool is_ended = !err || (err == -EINTR && pace->is_looped);
+    if (err == -EINTR && !is_ended)
+        gn_error_set(&error, err, "interrupted");
+    if (!is_ended)
+        gn_cmd_fail(&program, error.text);
+    printf("%ld environment frames sent", p->n_sent);
+    gn_cmd_pace_print(pace);
+    printf("\n");
+    return is_ended ? 0 : 1;
 }
 
 int gn_cmd_probe(int argc, char *const argv[])
 {
     struct gn_options *options = NULL;
-    int run = gn_cmd_load(&program, argc, argv, &options);
-    if (run <= 0)
-        return run ? 2 : 0;
+    int go = gn_cmd_load(&program, argc, argv, &options);
+    if (go <= 0)
+        return go ? 2 : 0;
     gn_cmd_catch_signals();
     struct gn_error error = {0};
-    struct gn_source *source = NULL;
-    struct gn_client *client = NULL;
-    struct gn_probe_setup setup;
+    struct probe p = {0};
     struct gn_cmd_pace pace;
     bool has_times = gn_options_is_set(options, NULL, NULL, "sequence");
-    gn_cmd_pace_init(&pace, options, has_times ? 0 : DEFAULT_RATE_HZ);
+    const char *misuse = find_misuse(options);
     int status = 1;
-    if (open_source(options, &pace, &setup, &source, &error)) {
+    gn_cmd_pace_init(&pace, &program, options, has_times ? 0 : DEFAULT_RATE_HZ);
+    if (misuse) {
+        gn_cmd_fail(&program, misuse);
+        status = 2;
+    } else if (open_source(options, &pace, &p.setup, &p.source, &error) < 0 ||
+               gn_cmd_connect(&program, options, GN_MSG_ROLE_PROBE, &p.client, &error) < 0) {
         gn_cmd_fail(&program, error.text);
-    } else if (gn_cmd_connect(&program, options, GN_MSG_ROLE_PROBE, &client) == 0) {
-        struct gn_msg_environment_frame frame;
-        make_frame(&setup, &frame);
-        frame.sequence = (uint64_t)gn_options_get_double(options, NULL, NULL, "first-sequence");
-        status = send_all(client, source, &pace, &frame);
-        gn_cmd_disconnect(&client);
+    } else {
+        make_frame(&p.setup, &p.frame);
+        p.first_sequence = (uint64_t)gn_options_get_int(options, NULL, NULL, "first-sequence");
+        p.clock_ns = gn_clock_get_monotonic_ns();
+        status = run(&p, &pace);
     }
-    gn_source_close(&source);
+    gn_cmd_disconnect(&p.client);
+    gn_source_close(&p.source);
     gn_options_destroy(&options);
     return status;
 }

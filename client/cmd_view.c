@@ -14,12 +14,14 @@
 #include "client/cmd.h"
 #include "client/view/record.h"
 #include "common/clock.h"
+#include "common/text.h"
 #include "proto/attr.h"
 
 /** Pictures per second where neither the files nor --rate say. */
 #define DEFAULT_RATE_HZ 10.0
-/** How long the last results are waited for. */
-#define LAST_RESULTS_NS (60 * GN_NS_PER_S)
+/** How long a frame's answer is waited for; of reference quality, which takes minutes. */
+#define ANSWER_NS (60 * GN_NS_PER_S)
+#define REFERENCE_ANSWER_NS (3600 * GN_NS_PER_S)
 /** Most frames on their way at once. */
 #define MAX_OUTSTANDING 16
 
@@ -37,7 +39,8 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_STRING,
      .value_name = "DIR",
      .is_required = true,
-     .help = "Where the composited frames and view.json (every receipt) go."},
+     .help = "Where the composited frames and view.json (every receipt) go; each round of --loop "
+             "replaces the pictures of the one before."},
     {.key = "result",
      .flag = "result",
      .type = GN_OPTION_ENUM,
@@ -69,9 +72,9 @@ static const struct gn_option option_table[] = {
              "ones and come back as dropped."},
     {.key = "sync-light",
      .flag = "sync-light",
-     .type = GN_OPTION_DOUBLE,
+     .type = GN_OPTION_INT,
      .min = 1,
-     .max = 9e15,
+     .max = 2e9,
      .value_name = "N",
      .help = "Have picture k wait for the light of environment frame N + k, k from 0, for at most "
              "5 s: replays are then lit as they were recorded. See probe --first-sequence."},
@@ -94,7 +97,7 @@ static const struct gn_program program = {
 struct pending {
     uint64_t id;
     int64_t sent_ns;
-    char name[256];
+    char name[GN_FILE_NAME_BYTES];
 };
 
 /** One run of the command. */
@@ -105,12 +108,24 @@ struct view {
     struct gn_camera camera;
     struct gn_msg_frame frame; // what all frames have in common
     uint64_t sync_light;       // 0: not asked for
+    int64_t clock_ns;          // when the clock was measured
     int max_outstanding;
     int n_outstanding;
     struct pending pending[MAX_OUTSTANDING];
     long n_sent, n_results, n_dropped;
     double latency_sum_ms, latency_max_ms;
+    char last_drop[256]; // why a frame was dropped
 };
+
+/** What is wrong with the options together; NULL: nothing. */
+static const char *find_misuse(const struct gn_options *options)
+{
+    bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
+    bool has_files = gn_options_is_set(options, NULL, NULL, "files");
+    if (has_dir == has_files || has_files != gn_options_is_set(options, NULL, NULL, "camera"))
+        return "give --sequence DIR, or --files PATTERN with --camera FILE";
+    return NULL;
+}
 
 static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
                        struct view *v, struct gn_error *out_error)
@@ -118,9 +133,6 @@ static int open_source(const struct gn_options *options, const struct gn_cmd_pac
     const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
     const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
     const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
-    if (!dir == !pattern || !pattern != !camera_path)
-        return gn_error_set(out_error, -EINVAL,
-                            "give --sequence DIR, or --files PATTERN with --camera FILE");
     struct gn_sequence sequence = {0};
     struct gn_file_list list = {0};
     int err;
@@ -140,7 +152,9 @@ static int open_source(const struct gn_options *options, const struct gn_cmd_pac
     }
     struct gn_file_source_options source_options = {.is_looped = pace->is_looped};
     if (!err)
-        err = gn_file_source_open(&list, &source_options, &v->source);
+        err = gn_file_list_check_names(&list, out_error);
+    if (!err && gn_file_source_open(&list, &source_options, &v->source) < 0)
+        err = gn_error_set(out_error, -ENOMEM, "out of memory");
     gn_sequence_finish(&sequence);
     gn_file_list_finish(&list);
     return err;
@@ -201,10 +215,12 @@ static int take_answer(struct view *v, const struct gn_client_event *event,
                latency_ms, r->lights_used, (unsigned long long)r->lighting_sequence);
     } else {
         const struct gn_msg_dropped *d = &event->message.dropped;
-        err = gn_record_add_dropped(v->record, p->name, d);
+        err = gn_record_add_dropped(v->record, p->name, d, out_error);
         v->n_dropped++;
-        printf("frame %llu: %s, dropped: %s\n", (unsigned long long)id, p->name,
-               d->sentence[0] ? d->sentence : gn_wire_get_drop_text(d->reason));
+        snprintf(v->last_drop, sizeof(v->last_drop), "%s",
+                 d->sentence[0] ? d->sentence : gn_wire_get_drop_text(d->reason));
+        gn_text_clean(v->last_drop);
+        printf("frame %llu: %s, dropped: %s\n", (unsigned long long)id, p->name, v->last_drop);
     }
     fflush(stdout);
     p->id = 0;
@@ -212,39 +228,48 @@ static int take_answer(struct view *v, const struct gn_client_event *event,
     return err;
 }
 
+/** Refuses to wait any longer for a frame that is out. */
+static int check_answers(const struct view *v, struct gn_error *out_error)
+{
+    int64_t now_ns = gn_client_now_ns();
+    int64_t limit_ns =
+        v->frame.quality == GN_MSG_QUALITY_REFERENCE ? REFERENCE_ANSWER_NS : ANSWER_NS;
+    for (int i = 0; i < MAX_OUTSTANDING; i++) {
+        const struct pending *p = &v->pending[i];
+        if (p->id && now_ns - p->sent_ns > limit_ns)
+            return gn_error_set(out_error, -ETIMEDOUT, "frame %llu (%s) was not answered in %d s",
+                                (unsigned long long)p->id, p->name, (int)(limit_ns / GN_NS_PER_S));
+    }
+    return 0;
+}
+
 /**
- * Takes events until due_ns, then until no more than max_left frames are out (but not beyond
- * give_up_ns). 0, -EINTR (Ctrl-C), -ETIMEDOUT, or an error with its sentence.
+ * Takes events until due_ns and until no more than max_left frames are out. 0, -EINTR (Ctrl-C), or
+ * an error and its sentence.
  */
-static int serve(struct view *v, int64_t due_ns, int max_left, int64_t give_up_ns,
-                 struct gn_error *out_error)
+static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *out_error)
 {
     for (;;) {
         if (gn_cmd_is_interrupted())
             return -EINTR;
-        int64_t now_ns = gn_clock_get_monotonic_ns(), left_ns = due_ns - now_ns;
-        if (left_ns <= 0 && now_ns > give_up_ns && v->n_outstanding > max_left)
-            return gn_error_set(out_error, -ETIMEDOUT, "%d frames never came back",
-                                v->n_outstanding);
-        int timeout_ms = left_ns <= 0 || left_ns > 200000000 ? 200 : (int)(left_ns / 1000000) + 1;
-        if (left_ns <= 0 && v->n_outstanding <= max_left)
-            timeout_ms = 0;
+        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
+        bool is_due = timeout_ms == 0;
+        if (is_due && v->n_outstanding > max_left)
+            timeout_ms = 200;
         struct gn_client_event event;
-        int got = gn_client_poll(v->client, timeout_ms, &event);
-        int err = 0;
-        if (got < 0 && got != -EINTR)
-            return gn_error_set(out_error, got, "%s", gn_client_get_fault(v->client));
-        if (got > 0 && (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED))
+        int err, got = gn_client_poll(v->client, timeout_ms, &event);
+        if (got < 0)
+            err = gn_cmd_set_fault(v->client, got, out_error);
+        else if (got == 0)
+            err = gn_cmd_keep_clock(v->client, &v->clock_ns, out_error);
+        else if (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED)
             err = take_answer(v, &event, out_error);
-        else if (got > 0 && event.type == GN_WIRE_ERROR)
-            err = gn_error_set(out_error, -EPROTO, "the server: %s", event.message.error.sentence);
-        else if (got > 0 && event.type == GN_WIRE_BYE)
-            err = gn_error_set(out_error, -ECONNRESET, "the server ended the session: %s",
-                               gn_wire_get_bye_text(event.message.bye.reason));
-        if (err)
+        else
+            err = gn_cmd_take_event(&event, out_error);
+        if (!err)
+            err = check_answers(v, out_error);
+        if (err || (is_due && got == 0 && v->n_outstanding <= max_left))
             return err;
-        if (timeout_ms == 0 && got == 0)
-            return 0;
     }
 }
 
@@ -278,33 +303,32 @@ static int send_frame(struct view *v, const struct gn_capture *capture, struct g
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
     int err = gn_client_send_frame(v->client, &frame, capture->data, capture->data_bytes);
     if (err)
-        return gn_error_set(out_error, err, "%s", gn_client_get_fault(v->client));
+        return gn_cmd_set_fault(v->client, err, out_error);
     v->n_sent++;
     v->n_outstanding++;
     return 0;
 }
 
-static int stream(struct view *v, const struct gn_cmd_pace *pace, struct gn_error *out_error)
+static int stream(struct view *v, struct gn_cmd_pace *pace, struct gn_error *out_error)
 {
     int err = send_camera(v);
     if (err)
-        return gn_error_set(out_error, err, "%s", gn_client_get_fault(v->client));
-    for (long n = 0; !pace->n_wanted || n < pace->n_wanted; n++) {
+        return gn_cmd_set_fault(v->client, err, out_error);
+    while (!pace->n_wanted || v->n_sent < pace->n_wanted) {
         struct gn_capture capture;
         int got = gn_source_read(v->source, &capture, out_error);
         if (got < 0)
             return got;
         if (got == 0)
             break;
-        int64_t due_ns = gn_cmd_pace_get_due_ns(pace, n, capture.time_s);
-        err = serve(v, due_ns, v->max_outstanding - 1, due_ns + LAST_RESULTS_NS, out_error);
+        int64_t due_ns = gn_cmd_pace_get_due_ns(pace, v->n_sent, capture.time_s);
+        err = serve(v, due_ns, v->max_outstanding - 1, out_error);
         if (!err)
             err = send_frame(v, &capture, out_error);
         if (err)
             return err;
     }
-    int64_t now_ns = gn_clock_get_monotonic_ns();
-    return serve(v, now_ns, 0, now_ns + LAST_RESULTS_NS, out_error);
+    return serve(v, 0, 0, out_error);
 }
 
 static void set_frame_options(struct view *v, const struct gn_options *options)
@@ -318,26 +342,29 @@ static void set_frame_options(struct view *v, const struct gn_options *options)
     v->frame.quality = qualities[gn_options_get_enum(options, NULL, NULL, "quality")];
     v->max_outstanding = gn_options_get_int(options, NULL, NULL, "outstanding");
     if (gn_options_is_set(options, NULL, NULL, "sync-light"))
-        v->sync_light = (uint64_t)gn_options_get_double(options, NULL, NULL, "sync-light");
+        v->sync_light = (uint64_t)gn_options_get_int(options, NULL, NULL, "sync-light");
 }
 
 /** Runs with everything open; the exit status. */
-static int run(struct view *v, const struct gn_cmd_pace *pace, const char *dir)
+static int run(struct view *v, struct gn_cmd_pace *pace, const char *dir)
 {
-    struct gn_error error = {0};
+    struct gn_error error = {0}, record_error = {0};
     int err = stream(v, pace, &error);
-    struct gn_error record_error = {0};
-    int record_err = gn_record_close(&v->record, &record_error);
-    if (err && err != -EINTR)
-        gn_cmd_fail(&program, error.text);
-    if (record_err)
-        gn_cmd_fail(&program, record_error.text);
+    bool is_complete = !err;
+    if (err == -EINTR)
+        err = pace->is_looped ? 0 : gn_error_set(&error, err, "interrupted");
+    if (!err && v->n_results == 0 && v->n_dropped > 0)
+        err = gn_error_set(&error, -ENODATA, "no frame was rendered: %s", v->last_drop);
+    int record_err = gn_record_close(&v->record, v->n_sent, is_complete, &record_error);
+    if (err || record_err)
+        gn_cmd_fail(&program, err ? error.text : record_error.text);
     printf("%ld frames sent, %ld results, %ld dropped", v->n_sent, v->n_results, v->n_dropped);
     if (v->n_results)
         printf("; %.1f ms from sending to result (mean), %.1f at most",
                v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
+    gn_cmd_pace_print(pace);
     printf("; in %s\n", dir);
-    return (err && err != -EINTR) || record_err ? 1 : 0;
+    return err || record_err ? 1 : 0;
 }
 
 int gn_cmd_view(int argc, char *const argv[])
@@ -351,22 +378,23 @@ int gn_cmd_view(int argc, char *const argv[])
     struct view v = {0};
     struct gn_cmd_pace pace;
     bool has_times = gn_options_is_set(options, NULL, NULL, "sequence");
-    gn_cmd_pace_init(&pace, options, has_times ? 0 : DEFAULT_RATE_HZ);
-    set_frame_options(&v, options);
+    const char *misuse = find_misuse(options);
     const char *dir = gn_options_get_string(options, NULL, NULL, "out");
     int status = 1;
-    int err = open_source(options, &pace, &v, &error);
-    if (!err)
-        err = gn_record_open(dir, &v.record, &error);
-    if (err)
+    gn_cmd_pace_init(&pace, &program, options, has_times ? 0 : DEFAULT_RATE_HZ);
+    set_frame_options(&v, options);
+    if (misuse) {
+        gn_cmd_fail(&program, misuse);
+        status = 2;
+    } else if (open_source(options, &pace, &v, &error) < 0 ||
+               gn_cmd_connect(&program, options, GN_MSG_ROLE_VIEWER, &v.client, &error) < 0 ||
+               gn_record_open(dir, &v.record, &error) < 0) {
         gn_cmd_fail(&program, error.text);
-    else if (gn_cmd_connect(&program, options, GN_MSG_ROLE_VIEWER, &v.client) == 0)
+    } else {
+        v.clock_ns = gn_clock_get_monotonic_ns();
         status = run(&v, &pace, dir);
-    if (v.client)
-        gn_cmd_disconnect(&v.client);
-    // Still open only where there was no run: view.json of nothing says nothing.
-    if (v.record && gn_record_close(&v.record, &error))
-        gn_cmd_fail(&program, error.text);
+    }
+    gn_cmd_disconnect(&v.client);
     gn_source_close(&v.source);
     gn_options_destroy(&options);
     return status;

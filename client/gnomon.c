@@ -28,21 +28,32 @@ static void print_help(FILE *out)
     fprintf(out, "\n`gnomon COMMAND --help` tells more. A first try: deploy/quickstart.\n");
 }
 
+/** What could not be printed makes a failure of success. */
+static int finish_output(int status)
+{
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return status;
+    fprintf(stderr, "gnomon: cannot write to the standard output\n");
+    return status ? status : 1;
+}
+
 int main(int argc, char *argv[])
 {
     const char *name = argc > 1 ? argv[1] : "";
     if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
         print_help(stdout);
-        return 0;
+        return finish_output(0);
     }
     if (strcmp(name, "--version") == 0) {
         printf("gnomon %s\n", GN_VERSION);
-        return 0;
+        return finish_output(0);
     }
     const char *meant = NULL;
     for (size_t i = 0; i < GN_ARRAY_LEN(commands); i++) {
-        if (strcmp(name, commands[i].name) == 0)
-            return commands[i].run(argc - 1, argv + 1);
+        if (strcmp(name, commands[i].name) == 0) {
+            int status = commands[i].run(argc - 1, argv + 1);
+            return finish_output(status);
+        }
         gn_text_suggest(name, commands[i].name, &meant);
     }
     if (!*name)

@@ -174,6 +174,7 @@ int gn_probe_setup_read_json(const struct gn_json *object, struct gn_probe_setup
         ret = gn_json_get_enum(object, "pixel_format", formats, GN_ARRAY_LEN(formats), &format,
                                out_error);
     setup.is_12_bit = format == 1;
+    setup.has_response = gn_json_has(object, "response");
     if (ret == 0)
         ret = gn_response_read_json(object, &setup.response, out_error);
     if (ret == 0)

@@ -20,6 +20,7 @@
 struct gn_probe_setup {
     struct gn_projection projection; // width, height 0: those of the pictures; not yet initialised
     struct gn_response response;
+    bool has_response; // said, not just the default (linear): codes need one
     struct gn_pose world_from_probe;
     bool is_12_bit; // 16-bit files hold codes [0, 4095]
 };

@@ -69,14 +69,17 @@ int gn_file_writer_open(struct gn_file_writer *writer, const char *path, struct 
 {
     static atomic_uint counter;
     int r = 0;
-    size_t size = strlen(path) + 48;
+    // Its own short name: a name as long as the file system allows has no room for a suffix.
+    const char *slash = strrchr(path, '/');
+    int n_dir = slash ? (int)(slash - path) + 1 : 0;
+    size_t size = (size_t)n_dir + 64;
     *writer = (struct gn_file_writer){.fd = -1, .path = strdup(path), .temp_path = malloc(size)};
     if (!writer->path || !writer->temp_path) {
         r = gn_error_set(out_error, -ENOMEM, "cannot write %s: out of memory", path);
         goto out;
     }
     do {
-        snprintf(writer->temp_path, size, "%s.%ld-%u.tmp", path, (long)getpid(),
+        snprintf(writer->temp_path, size, "%.*sgnomon-%ld-%u.tmp", n_dir, path, (long)getpid(),
                  atomic_fetch_add(&counter, 1));
         writer->fd = open(writer->temp_path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     } while (writer->fd < 0 && (errno == EEXIST || errno == EINTR));

@@ -2,180 +2,67 @@
 /* SPDX-License-Identifier: ISC */
 #include "client/capture/file.h"
 
-#include <dirent.h>
 #include <errno.h>
-#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "common/file.h"
 #include "common/image_file.h"
 #include "common/jpeg.h"
 
 /** Largest file that is sent as it is. */
-#define MAX_JPEG_BYTES (64L << 20)
-
-void gn_file_list_finish(struct gn_file_list *list)
-{
-    for (int i = 0; i < list->n_entries; i++)
-        free(list->entries[i].path);
-    free(list->entries);
-    memset(list, 0, sizeof(*list));
-}
-
-int gn_file_list_add(struct gn_file_list *list, const char *path, struct gn_file_entry **out_entry)
-{
-    if (list->n_entries == GN_FILE_SOURCE_MAX)
-        return -E2BIG;
-    // Grows at powers of two.
-    int n = list->n_entries;
-    if ((n & (n - 1)) == 0) {
-        size_t capacity = n ? 2 * (size_t)n : 1;
-        struct gn_file_entry *grown = realloc(list->entries, capacity * sizeof(*grown));
-        if (!grown)
-            return -ENOMEM;
-        list->entries = grown;
-    }
-    struct gn_file_entry *entry = &list->entries[n];
-    memset(entry, 0, sizeof(*entry));
-    entry->path = strdup(path);
-    if (!entry->path)
-        return -ENOMEM;
-    list->n_entries = n + 1;
-    if (out_entry)
-        *out_entry = entry;
-    return 0;
-}
-
-static bool is_regular(const char *path)
-{
-    struct stat st;
-    return stat(path, &st) == 0 && S_ISREG(st.st_mode);
-}
-
-/** A folder stands for all in it: "DIR/" followed by '*', the folder's own special characters kept.
- */
-static char *make_pattern(const char *pattern)
-{
-    struct stat st;
-    if (stat(pattern, &st) != 0 || !S_ISDIR(st.st_mode))
-        return strdup(pattern);
-    char *out = malloc(2 * strlen(pattern) + 3);
-    if (!out)
-        return NULL;
-    char *p = out;
-    for (const char *c = pattern; *c; c++) {
-        if (strchr("*?[\\", *c))
-            *p++ = '\\';
-        *p++ = *c;
-    }
-    memcpy(p, "/*", 3);
-    return out;
-}
-
-int gn_file_list_find(const char *pattern, double rate_hz, struct gn_file_list *list,
-                      struct gn_error *out_error)
-{
-    glob_t found = {0};
-    char *whole = make_pattern(pattern);
-    int err = whole ? 0 : -ENOMEM;
-    if (!err) {
-        int got = glob(whole, 0, NULL, &found); // sorts by name
-        if (got == GLOB_NOSPACE)
-            err = -ENOMEM;
-        else if (got != 0 && got != GLOB_NOMATCH)
-            err = -EIO;
-    }
-    for (size_t i = 0; !err && i < found.gl_pathc; i++) {
-        if (!is_regular(found.gl_pathv[i]))
-            continue;
-        struct gn_file_entry *entry = NULL;
-        err = gn_file_list_add(list, found.gl_pathv[i], &entry);
-        if (!err)
-            entry->time_s = rate_hz > 0 ? (list->n_entries - 1) / rate_hz : 0;
-    }
-    globfree(&found);
-    free(whole);
-    if (!err && list->n_entries == 0)
-        err = -ENOENT;
-    if (err) {
-        gn_file_list_finish(list);
-        gn_error_set(out_error, err, "%s: %s", pattern,
-                     err == -ENOENT
-                         ? "no file there (a folder, or a pattern such as 'frames/*.png')"
-                     : err == -E2BIG ? "too many files"
-                                     : strerror(-err));
-    }
-    return err;
-}
+#define MAX_JPEG_BYTES ((size_t)64 << 20)
 
 struct file_source {
     struct gn_source head;
     struct gn_file_list list;
     struct gn_file_source_options options;
-    int next;        // index into list
-    double loop_s;   // added to times: length of the loops that have passed
-    char name[256];  // of the last capture
-    uint8_t *buffer; // its pixels where they are not those of `picture`; owned
+    int next;                      // index into list
+    double loop_s;                 // added to times: length of the loops that have passed
+    char name[GN_FILE_NAME_BYTES]; // of the last capture
+    uint8_t *buffer;               // its pixels where they are not those of `picture`; owned
     struct gn_image_file picture;
     struct gn_jpeg *jpeg;
 };
 
-static void set_name(struct file_source *s, const char *path)
+/** Whether the file begins as a JPEG does. Not, where it cannot be read: its reader says why. */
+static bool is_jpeg_file(const char *path)
 {
-    const char *base = strrchr(path, '/');
-    base = base ? base + 1 : path;
-    snprintf(s->name, sizeof(s->name), "%s", base);
-    char *dot = strrchr(s->name, '.');
-    if (dot && dot != s->name)
-        *dot = '\0';
+    unsigned char head[4];
+    struct stat st;
+    FILE *f = stat(path, &st) == 0 && S_ISREG(st.st_mode) ? fopen(path, "rb") : NULL;
+    bool is_jpeg =
+        f && fread(head, 1, sizeof(head), f) == sizeof(head) && gn_jpeg_is_jpeg(head, sizeof(head));
+    if (f)
+        fclose(f);
+    return is_jpeg;
 }
 
-/** Reads a whole JPEG file. 1: it is one; 0: it is none. */
+/** Reads a JPEG file as it is: the server decodes it. */
 static int read_jpeg(struct file_source *s, const char *path, struct gn_capture *out,
                      struct gn_error *out_error)
 {
-    FILE *f = fopen(path, "rb");
-    if (!f)
-        return gn_error_set(out_error, -errno, "%s: %s", path, strerror(errno));
-    unsigned char head[4] = {0};
-    int err = 0;
-    if (fread(head, 1, sizeof(head), f) != sizeof(head) || !gn_jpeg_is_jpeg(head, sizeof(head)))
-        goto out;
-    long size = fseek(f, 0, SEEK_END) == 0 ? ftell(f) : -1;
-    if (size < 0 || size > MAX_JPEG_BYTES) {
-        err = gn_error_set(out_error, -EFBIG, "%s: larger than %ld bytes", path, MAX_JPEG_BYTES);
-        goto out;
-    }
-    rewind(f);
-    s->buffer = malloc((size_t)size);
-    if (!s->buffer) {
-        err = -ENOMEM;
-        goto out;
-    }
-    if (fread(s->buffer, 1, (size_t)size, f) != (size_t)size) {
-        err = gn_error_set(out_error, -EIO, "%s: could not be read", path);
-        goto out;
-    }
-    if (!s->jpeg)
-        err = gn_jpeg_create(&s->jpeg);
+    size_t size = 0;
+    int err = gn_file_read(path, MAX_JPEG_BYTES, &s->buffer, &size, out_error);
+    if (err)
+        return err;
     struct gn_error why = {0};
     int channels;
-    if (!err)
-        err = gn_jpeg_get_size(s->jpeg, s->buffer, (size_t)size, &out->width, &out->height,
-                               &channels, &why);
-    if (err) {
-        gn_error_set(out_error, err, "%s: %s", path, why.text);
-        goto out;
-    }
+    if (!s->jpeg)
+        err = gn_jpeg_create(&s->jpeg);
+    if (err)
+        gn_error_set(&why, err, "out of memory");
+    else
+        err =
+            gn_jpeg_get_size(s->jpeg, s->buffer, size, &out->width, &out->height, &channels, &why);
+    if (err)
+        return gn_error_set(out_error, err, "%s: %s", path, why.text);
     out->format = GN_CAPTURE_JPEG;
     out->data = s->buffer;
-    out->data_bytes = (size_t)size;
-    err = 1;
-out:
-    fclose(f);
-    return err;
+    out->data_bytes = size;
+    return 0;
 }
 
 /** Linear float picture of 1 or 3 channels to RGB float32. */
@@ -256,9 +143,8 @@ static int read_picture(struct file_source *s, const char *path, struct gn_captu
     free(s->buffer);
     s->buffer = NULL;
     gn_image_file_finish(&s->picture);
-    int got = read_jpeg(s, path, out, out_error);
-    if (got != 0)
-        return got < 0 ? got : 0;
+    if (is_jpeg_file(path))
+        return read_jpeg(s, path, out, out_error);
     int err = gn_image_read_file(path, &s->picture, out_error);
     if (err)
         return err;
@@ -299,7 +185,7 @@ static int file_read(struct gn_source *source, struct gn_capture *out, struct gn
     int err = read_picture(s, entry->path, &capture, out_error);
     if (err)
         return err;
-    set_name(s, entry->path);
+    gn_file_get_name(entry->path, s->name);
     capture.name = s->name;
     s->next++;
     *out = capture;

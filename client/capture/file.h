@@ -35,12 +35,25 @@ GN_MUST_USE int gn_file_list_add(struct gn_file_list *list, const char *path,
                                  struct gn_file_entry **out_entry);
 
 /**
- * Lists a folder's regular files, or what a glob pattern matches, sorted by name; times follow
- * rate_hz. list must be zeroed. Returns 0, or a negative errno and a sentence: no match is an
- * error.
+ * Lists a folder's pictures (by their extension), one file, or the regular files that a glob
+ * pattern matches, sorted by name; times follow rate_hz. list must be zeroed. Returns 0, or a
+ * negative errno and a sentence: no match is an error.
  */
 GN_MUST_USE int gn_file_list_find(const char *pattern, double rate_hz, struct gn_file_list *list,
                                   struct gn_error *out_error);
+
+/** A file's name and the NUL. */
+#define GN_FILE_NAME_BYTES 256
+
+/**
+ * What files written about path are called: its name without folder and without a picture's
+ * extension, made printable.
+ */
+void gn_file_get_name(const char *path, char out_name[static GN_FILE_NAME_BYTES]);
+
+/** Refuses a list in which two files have the same such name. 0, -EEXIST or -ENOMEM, a sentence. */
+GN_MUST_USE int gn_file_list_check_names(const struct gn_file_list *list,
+                                         struct gn_error *out_error);
 
 /** All-zero is the default. */
 struct gn_file_source_options {
@@ -50,8 +63,8 @@ struct gn_file_source_options {
 };
 
 /**
- * Takes the list (zeroed for the caller) on success. The name of each capture is its file's,
- * without folder and extension. Returns 0 or -ENOMEM.
+ * Takes the list (zeroed for the caller) on success. The name of each capture is
+ * gn_file_get_name's. Returns 0 or -ENOMEM.
  */
 GN_MUST_USE int gn_file_source_open(struct gn_file_list *list,
                                     const struct gn_file_source_options *options,

@@ -18,7 +18,7 @@
 
 /** How the pixels of a capture lie in memory: rows from the top, no padding, little-endian. */
 enum gn_capture_format {
-    GN_CAPTURE_RGB_F32 = 0, // linear R, G, B float32
+    GN_CAPTURE_RGB_F32 = 0, // linear R, G, B float32; all others are codes of some response
     GN_CAPTURE_MONO12,      // codes [0, 4095] in 16 bits
     GN_CAPTURE_RGB12,
     GN_CAPTURE_MONO16, // codes [0, 65535]

@@ -99,8 +99,9 @@ static int shake_hands(struct gn_client *client, const struct gn_msg_hello *hell
                                   "the server speaks protocol %u to %u, this client %d to %d",
                                   m.error.version_min, m.error.version_max, GN_PROTO_VERSION_MIN,
                                   GN_PROTO_VERSION_MAX);
-        return gn_client_fail(&client->fault, -EACCES, "%s: %.120s",
-                              gn_wire_get_error_text(m.error.code), m.error.sentence);
+        return gn_client_fail(&client->fault, -EACCES, "%s",
+                              m.error.sentence[0] ? m.error.sentence
+                                                  : gn_wire_get_error_text(m.error.code));
     default:
         return gn_client_fail(&client->fault, -EPROTO, "HELLO was answered by a message of type %u",
                               message.envelope.type);

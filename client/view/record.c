@@ -8,50 +8,71 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include "common/file.h"
 #include "common/image.h"
+#include "common/jpeg.h"
 #include "common/png.h"
+#include "common/text.h"
 
 #define MAX_PATH_BYTES 4096
+/** Longest text of a message or a name, and the NUL. */
+#define MAX_TEXT_BYTES 512
 
 struct gn_record {
     char dir[MAX_PATH_BYTES - 300]; // leaves room for a file's name
-    json_t *frames;
+    struct gn_file_writer writer;   // of view.json
+    uint64_t n_bytes;               // of view.json so far
+    long n_results, n_dropped;
 };
+
+static int put(struct gn_record *r, const char *text, struct gn_error *out_error)
+{
+    size_t n = strlen(text);
+    int err = gn_file_writer_put(&r->writer, text, n, r->n_bytes);
+    if (err)
+        return gn_error_set(out_error, err, "%s/view.json: %s", r->dir, strerror(-err));
+    r->n_bytes += n;
+    return 0;
+}
 
 int gn_record_open(const char *dir, struct gn_record **out, struct gn_error *out_error)
 {
     *out = NULL;
     struct gn_record *r = calloc(1, sizeof(*r));
     if (!r)
-        return -ENOMEM;
-    int err = 0;
-    int n = snprintf(r->dir, sizeof(r->dir), "%s", dir);
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    char path[MAX_PATH_BYTES];
+    int n = snprintf(r->dir, sizeof(r->dir), "%s", dir), err = 0;
     if (n < 0 || (size_t)n >= sizeof(r->dir))
         err = -ENAMETOOLONG;
     else if (mkdir(dir, 0777) != 0 && errno != EEXIST)
         err = -errno;
-    r->frames = err ? NULL : json_array();
-    if (!err && !r->frames)
-        err = -ENOMEM;
     if (err) {
-        free(r);
-        return gn_error_set(out_error, err, "%s: cannot be the folder of results: %s", dir,
-                            strerror(-err));
+        gn_error_set(out_error, err, "%s: cannot be the folder of results: %s", dir,
+                     strerror(-err));
+        goto out;
+    }
+    snprintf(path, sizeof(path), "%s/view.json", r->dir);
+    err = gn_file_writer_open(&r->writer, path, out_error);
+    if (err)
+        goto out;
+    // An old one beside new pictures would lie, should this run be killed.
+    unlink(path);
+    err = put(r, "{\"format\": \"gnomon-view 1\",\n\"frames\": [", out_error);
+    if (err) {
+        gn_file_writer_abort(&r->writer);
+        goto out;
     }
     *out = r;
     return 0;
+out:
+    free(r);
+    return err;
 }
 
-static int write_jpeg(const char *path, const uint8_t *data, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    if (!f)
-        return -errno;
-    bool is_written = fwrite(data, 1, size, f) == size;
-    return fclose(f) == 0 && is_written ? 0 : -EIO;
-}
-
+/** Writes what came back about one view. */
 static int write_picture(const struct gn_record *r, const char *name,
                          const struct gn_msg_result_view *view, const uint8_t *payload,
                          struct gn_error *out_error)
@@ -60,10 +81,10 @@ static int write_picture(const struct gn_record *r, const char *name,
     bool is_jpeg = view->format == GN_MSG_PICTURE_FORMAT_JPEG;
     snprintf(path, sizeof(path), "%s/%s.%s", r->dir, name, is_jpeg ? "jpg" : "png");
     const uint8_t *data = payload + view->payload_offset;
-    if (is_jpeg) {
-        int err = write_jpeg(path, data, view->payload_length);
-        return err ? gn_error_set(out_error, err, "%s: %s", path, strerror(-err)) : 0;
-    }
+    if (is_jpeg && !gn_jpeg_is_jpeg(data, view->payload_length))
+        return gn_error_set(out_error, -EPROTO, "%s: the server's JPEG is none", name);
+    if (is_jpeg)
+        return gn_file_write(path, data, view->payload_length, out_error);
     struct gn_image8 image = {0};
     int err = gn_image8_init(&image, (int)view->width, (int)view->height, 3);
     if (err)
@@ -80,12 +101,26 @@ static int write_picture(const struct gn_record *r, const char *name,
     return err;
 }
 
+/** A string of the server's as JSON: it may hold anything. */
+static json_t *make_text(const char *text)
+{
+    char clean[MAX_TEXT_BYTES];
+    snprintf(clean, sizeof(clean), "%s", text);
+    gn_text_clean(clean);
+    return json_string(clean);
+}
+
 static json_t *make_receipt(const struct gn_msg_receipt *r)
 {
     json_t *left_out = json_array();
-    for (int i = 0; i < (int)r->left_out_count; i++)
-        json_array_append_new(left_out, json_pack("{s:s, s:s}", "pass", r->left_out[i].pass, "why",
-                                                  r->left_out[i].why));
+    for (int i = 0; i < (int)r->left_out_count; i++) {
+        json_t *entry = json_pack("{s:o, s:o}", "pass", make_text(r->left_out[i].pass), "why",
+                                  make_text(r->left_out[i].why));
+        if (json_array_append_new(left_out, entry) != 0) {
+            json_decref(left_out);
+            return NULL;
+        }
+    }
     json_t *stages = json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "queue",
                                (double)r->queue_ms, "decode", (double)r->decode_ms, "plan",
                                (double)r->plan_ms, "primary", (double)r->primary_ms, "shade",
@@ -94,16 +129,27 @@ static json_t *make_receipt(const struct gn_msg_receipt *r)
     json_t *rays =
         json_pack("{s:I, s:I, s:I}", "primary", (json_int_t)r->rays_primary, "shadow",
                   (json_int_t)r->rays_shadow, "secondary", (json_int_t)r->rays_secondary);
-    json_t *receipt =
-        json_pack("{s:o, s:I, s:f, s:i, s:o, s:o}", "stages_ms", stages, "lighting_sequence",
-                  (json_int_t)r->lighting_sequence, "lighting_age_ms", (double)r->lighting_age_ms,
-                  "lights", (int)r->lights_used, "rays", rays, "left_out", left_out);
     // A negative estimate means that there is none.
-    if (receipt && r->estimated_error >= 0)
-        json_object_set_new(receipt, "estimated_error", json_real((double)r->estimated_error));
-    else if (receipt)
-        json_object_set_new(receipt, "estimated_error", json_null());
-    return receipt;
+    json_t *error = r->estimated_error >= 0 ? json_real((double)r->estimated_error) : json_null();
+    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o}", "stages_ms", stages,
+                     "lighting_sequence", (json_int_t)r->lighting_sequence, "lighting_age_ms",
+                     (double)r->lighting_age_ms, "lights", (int)r->lights_used, "rays", rays,
+                     "left_out", left_out, "estimated_error", error);
+}
+
+/** Appends one frame to view.json; takes it. */
+static int put_frame(struct gn_record *r, json_t *frame, struct gn_error *out_error)
+{
+    char *text = frame ? json_dumps(frame, JSON_REAL_PRECISION(9)) : NULL;
+    json_decref(frame);
+    if (!text)
+        return gn_error_set(out_error, -ENOMEM, "%s/view.json: out of memory for a receipt",
+                            r->dir);
+    int err = put(r, r->n_results + r->n_dropped ? ",\n" : "\n", out_error);
+    if (!err)
+        err = put(r, text, out_error);
+    free(text);
+    return err;
 }
 
 int gn_record_add_result(struct gn_record *record, const char *name,
@@ -118,37 +164,42 @@ int gn_record_add_result(struct gn_record *record, const char *name,
         if (err)
             return err;
     }
-    json_t *receipt = make_receipt(&result->receipt);
-    json_t *frame =
-        json_pack("{s:s, s:I, s:s, s:f, s:o}", "name", name, "id", (json_int_t)result->id,
-                  "outcome", "result", "latency_ms", latency_ms, "receipt", receipt);
-    if (json_array_append_new(record->frames, frame) != 0)
-        return gn_error_set(out_error, -ENOMEM, "view.json: %s", strerror(ENOMEM));
-    return 0;
+    json_t *frame = json_pack("{s:o, s:I, s:s, s:f, s:o}", "name", make_text(name), "id",
+                              (json_int_t)result->id, "outcome", "result", "latency_ms", latency_ms,
+                              "receipt", make_receipt(&result->receipt));
+    int err = put_frame(record, frame, out_error);
+    record->n_results += !err;
+    return err;
 }
 
 int gn_record_add_dropped(struct gn_record *record, const char *name,
-                          const struct gn_msg_dropped *dropped)
+                          const struct gn_msg_dropped *dropped, struct gn_error *out_error)
 {
-    json_t *frame = json_pack(
-        "{s:s, s:I, s:s, s:s, s:s}", "name", name, "id", (json_int_t)dropped->id, "outcome",
-        "dropped", "reason", gn_wire_get_drop_text(dropped->reason), "sentence", dropped->sentence);
-    return json_array_append_new(record->frames, frame) != 0 ? -ENOMEM : 0;
+    json_t *frame =
+        json_pack("{s:o, s:I, s:s, s:s, s:o}", "name", make_text(name), "id",
+                  (json_int_t)dropped->id, "outcome", "dropped", "reason",
+                  gn_wire_get_drop_text(dropped->reason), "sentence", make_text(dropped->sentence));
+    int err = put_frame(record, frame, out_error);
+    record->n_dropped += !err;
+    return err;
 }
 
-int gn_record_close(struct gn_record **record, struct gn_error *out_error)
+int gn_record_close(struct gn_record **record, long n_sent, bool is_complete,
+                    struct gn_error *out_error)
 {
     struct gn_record *r = *record;
     *record = NULL;
     if (!r)
         return 0;
-    char path[MAX_PATH_BYTES];
-    snprintf(path, sizeof(path), "%s/view.json", r->dir);
-    json_t *root = json_pack("{s:s, s:o}", "format", "gnomon-view 1", "frames", r->frames);
-    int err = root ? 0 : -ENOMEM;
-    if (!err && json_dump_file(root, path, JSON_INDENT(1) | JSON_REAL_PRECISION(9)) != 0)
-        err = -EIO;
-    json_decref(root);
+    char tail[256];
+    snprintf(tail, sizeof(tail),
+             "],\n\"sent\": %ld, \"results\": %ld, \"dropped\": %ld, \"complete\": %s}\n", n_sent,
+             r->n_results, r->n_dropped, is_complete ? "true" : "false");
+    int err = put(r, tail, out_error);
+    if (err)
+        gn_file_writer_abort(&r->writer);
+    else
+        err = gn_file_writer_commit(&r->writer, out_error);
     free(r);
-    return err ? gn_error_set(out_error, err, "%s: could not be written", path) : 0;
+    return err;
 }
