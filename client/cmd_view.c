@@ -22,6 +22,8 @@
 /** How long a frame's answer is waited for; of reference quality, which takes minutes. */
 #define ANSWER_NS (60 * GN_NS_PER_S)
 #define REFERENCE_ANSWER_NS (3600 * GN_NS_PER_S)
+/** How long a frame may wait for light, ms. */
+#define LIGHT_WAIT_MS 5000
 /** Most frames on their way at once. */
 #define MAX_OUTSTANDING 16
 
@@ -85,7 +87,7 @@ static const struct gn_program program = {
     .usage = "--sequence DIR | --files PATTERN --camera FILE, --out DIR [OPTION]...",
     .summary = "Streams camera frames and poses to a room and writes the composited frames that "
                "come back, with their receipts. Every frame comes back exactly once, as a result "
-               "or as dropped with the reason.",
+               "or as dropped with the reason. At the start it waits up to 5 s for light.",
     .notes = "Examples:\n"
              "  gnomon view --sequence .cache/rig/lamps --out composites\n"
              "  gnomon view --files 'shots/*.jpg' --camera camera.json --out composites\n",
@@ -109,6 +111,7 @@ struct view {
     struct gn_msg_frame frame; // what all frames have in common
     uint64_t sync_light;       // 0: not asked for
     int64_t clock_ns;          // when the clock was measured
+    int64_t first_sent_ns;
     int max_outstanding;
     int n_outstanding;
     struct pending pending[MAX_OUTSTANDING];
@@ -273,17 +276,32 @@ static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *
     }
 }
 
+/** What light the frame waits for: that of its number, or, before the first result, any. */
+static void set_light_wanted(struct view *v, struct gn_msg_frame *frame)
+{
+    int64_t now_ns = gn_client_now_ns();
+    if (v->n_sent == 0)
+        v->first_sent_ns = now_ns;
+    int64_t left_ms = LIGHT_WAIT_MS - (now_ns - v->first_sent_ns) / GN_NS_PER_MS;
+    if (v->sync_light) {
+        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->n_sent;
+        frame->lighting_wait_ms = LIGHT_WAIT_MS;
+    } else if (v->n_results == 0 && left_ms > 0) {
+        frame->lighting_wait_ms = (uint32_t)left_ms;
+    }
+}
+
 static int send_frame(struct view *v, const struct gn_capture *capture, struct gn_error *out_error)
 {
-    if (capture->width != v->camera.width || capture->height != v->camera.height)
-        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
-                            capture->name, capture->width, capture->height, v->camera.width,
-                            v->camera.height);
     bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
     if (!is_jpeg && capture->format != GN_CAPTURE_RGB8)
         return gn_error_set(out_error, -EINVAL,
                             "%s is no 8-bit picture; camera frames are 8-bit PNG or JPEG",
                             capture->name);
+    if (capture->width != v->camera.width || capture->height != v->camera.height)
+        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
+                            capture->name, capture->width, capture->height, v->camera.width,
+                            v->camera.height);
     struct pending *p = find_pending(v, 0);
     struct gn_msg_frame frame = v->frame;
     frame.id = (uint64_t)v->n_sent + 1;
@@ -295,10 +313,7 @@ static int send_frame(struct view *v, const struct gn_capture *capture, struct g
         .payload_length = (uint32_t)capture->data_bytes,
     };
     gn_cmd_make_transform(&capture->world_from_camera, &frame.views[0].world_from_camera);
-    if (v->sync_light) {
-        frame.lighting_min_sequence = v->sync_light + (uint64_t)v->n_sent;
-        frame.lighting_wait_ms = 5000;
-    }
+    set_light_wanted(v, &frame);
     *p = (struct pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
     int err = gn_client_send_frame(v->client, &frame, capture->data, capture->data_bytes);
