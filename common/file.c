@@ -65,6 +65,58 @@ out:
     return r;
 }
 
+/* Reads until the end or beyond max_bytes. */
+static int read_to_end(int fd, size_t max_bytes, char **out_text, size_t *out_size)
+{
+    char *text = NULL;
+    size_t size = 0, capacity = 0;
+    ssize_t n = 1;
+    while (n != 0 && size <= max_bytes) {
+        if (size + 1 >= capacity) { // a byte is left for the NUL
+            capacity = capacity == 0 ? 65536 : 2 * capacity;
+            char *grown = realloc(text, capacity);
+            if (!grown) {
+                free(text);
+                return -ENOMEM;
+            }
+            text = grown;
+        }
+        n = read(fd, text + size, capacity - size - 1);
+        if (n < 0 && errno != EINTR) {
+            int r = -errno;
+            free(text);
+            return r;
+        }
+        size += n > 0 ? (size_t)n : 0;
+    }
+    text[size] = '\0';
+    *out_text = text;
+    *out_size = size;
+    return 0;
+}
+
+int gn_file_read_text(const char *path, size_t max_bytes, char **out_text, size_t *out_size,
+                      struct gn_error *out_error)
+{
+    char *text = NULL;
+    size_t size = 0;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return gn_error_set(out_error, -errno, "%s: cannot open: %s", path, strerror(errno));
+    int r = read_to_end(fd, max_bytes, &text, &size);
+    close(fd);
+    if (r)
+        return gn_error_set(out_error, r, "%s: cannot read: %s", path, strerror(-r));
+    if (size > max_bytes) {
+        free(text);
+        return gn_error_set(out_error, -EFBIG, "%s: larger than %zu MiB, the most that is read",
+                            path, max_bytes >> 20);
+    }
+    *out_text = text;
+    *out_size = size;
+    return 0;
+}
+
 int gn_file_writer_open(struct gn_file_writer *writer, const char *path, struct gn_error *out_error)
 {
     static atomic_uint counter;

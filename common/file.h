@@ -2,7 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * Files whole: read into memory up to a bound, and written so that a file is complete or absent
- * (temporary file in the same folder, then rename).
+ * (temporary file in the same folder, then rename), whenever the program ends. Nothing is synced:
+ * a machine that loses power may lose more.
  */
 #ifndef GN_COMMON_FILE_H
 #define GN_COMMON_FILE_H
@@ -21,6 +22,15 @@
  */
 GN_MUST_USE int gn_file_read(const char *path, size_t max_bytes, uint8_t **out_data,
                              size_t *out_size, struct gn_error *out_error);
+
+/**
+ * Reads what path gives up to its end, also a pipe's, which tells no size and is waited for. The
+ * caller frees the text; a NUL stands after its last byte, and may stand in it. max_bytes: whole
+ * MiB. Returns 0, or a negative errno and a sentence that begins with the path: -EFBIG where it is
+ * longer, -ENOMEM, whatever open and read say.
+ */
+GN_MUST_USE int gn_file_read_text(const char *path, size_t max_bytes, char **out_text,
+                                  size_t *out_size, struct gn_error *out_error);
 
 /** A file being written. Thread-safety: unsafe. Between open and commit or abort. */
 struct gn_file_writer {

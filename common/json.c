@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/file.h"
 #include "common/text.h"
 
 /* The path of a member (key) or an element (index) of parent; "..." ends what does not fit. */
@@ -87,51 +88,14 @@ int gn_json_load_text(const char *text, size_t size_bytes, const char *name,
     return 0;
 }
 
-/* Reads until the end or one byte more than is allowed; grows, since a pipe tells no size. */
-static int read_all(FILE *file, char **out_text, size_t *out_size)
-{
-    char *text = NULL;
-    size_t size = 0, capacity = 0;
-    int ret = 0;
-    while (size <= GN_JSON_MAX_BYTES) {
-        if (size == capacity) {
-            capacity = capacity == 0 ? 65536 : 2 * capacity;
-            char *grown = realloc(text, capacity);
-            if (grown == NULL) {
-                ret = -ENOMEM;
-                break;
-            }
-            text = grown;
-        }
-        errno = 0;
-        size_t n = fread(text + size, 1, capacity - size, file);
-        size += n;
-        if (n == 0) {
-            ret = ferror(file) ? (errno != 0 ? -errno : -EIO) : 0;
-            break;
-        }
-    }
-    if (ret < 0) {
-        free(text);
-        return ret;
-    }
-    *out_text = text;
-    *out_size = size;
-    return 0;
-}
-
 int gn_json_load_file(const char *path, struct gn_json *out_root, struct gn_error *out_error)
 {
-    *out_root = (struct gn_json){.file = path};
-    FILE *file = fopen(path, "rb");
-    if (file == NULL)
-        return gn_error_set(out_error, -errno, "%s: cannot open: %s", path, strerror(errno));
     char *text = NULL;
     size_t size = 0;
-    int ret = read_all(file, &text, &size);
-    fclose(file);
+    *out_root = (struct gn_json){.file = path};
+    int ret = gn_file_read_text(path, GN_JSON_MAX_BYTES, &text, &size, out_error);
     if (ret < 0)
-        return gn_error_set(out_error, ret, "%s: cannot read: %s", path, strerror(-ret));
+        return ret;
     ret = gn_json_load_text(text, size, path, out_root, out_error);
     free(text);
     return ret;
@@ -143,6 +107,14 @@ void gn_json_finish(struct gn_json *root)
     *root = (struct gn_json){0};
 }
 
+static bool is_among(const char *key, const char *const *keys, size_t n_keys)
+{
+    for (size_t i = 0; i < n_keys; i++)
+        if (strcmp(key, keys[i]) == 0)
+            return true;
+    return false;
+}
+
 int gn_json_check_keys(const struct gn_json *object, const char *const *keys, size_t n_keys,
                        struct gn_error *out_error)
 {
@@ -150,18 +122,16 @@ int gn_json_check_keys(const struct gn_json *object, const char *const *keys, si
     json_t *value;
     json_object_foreach(object->value, key, value)
     {
-        bool is_known = false;
-        const char *meant = NULL;
-        for (size_t i = 0; i < n_keys; i++) {
-            is_known = is_known || strcmp(key, keys[i]) == 0;
-            gn_text_suggest(key, keys[i], &meant);
-        }
-        if (is_known)
+        if (is_among(key, keys, n_keys))
             continue;
+        const char *meant = NULL;
         char known[256] = "";
-        for (size_t i = 0, n = 0; i < n_keys && n < sizeof(known); i++)
-            n +=
-                (size_t)snprintf(known + n, sizeof(known) - n, "%s%s", i == 0 ? "" : ", ", keys[i]);
+        for (size_t i = 0, n = 0; i < n_keys; i++) {
+            gn_text_suggest(key, keys[i], &meant);
+            if (n < sizeof(known))
+                n += (size_t)snprintf(known + n, sizeof(known) - n, "%s%s", i == 0 ? "" : ", ",
+                                      keys[i]);
+        }
         if (meant != NULL)
             return gn_json_refuse(object, NULL, out_error,
                                   "unknown key '%.40s'; did you mean '%s'?", key, meant);

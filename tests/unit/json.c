@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "common/json.h"
@@ -165,6 +167,31 @@ static void test_files(void **unused)
     assert_int_equal(gn_json_load_file("/dev/zero", &root, &e), -EFBIG); // tells no size
 }
 
+/* A pipe tells no size and gives its text in pieces. */
+static void test_pipe(void **unused)
+{
+    (void)unused;
+    int fds[2];
+    char path[32];
+    struct gn_json root;
+    assert_int_equal(pipe(fds), 0);
+    assert_int_equal(write(fds[1], "{\"a\":", 5), 5);
+    pid_t child = fork();
+    if (child == 0) {
+        nanosleep(&(struct timespec){.tv_nsec = 20000000}, NULL);
+        _exit(write(fds[1], "1}", 2) != 2);
+    }
+    close(fds[1]);
+    snprintf(path, sizeof(path), "/dev/fd/%d", fds[0]);
+    assert_int_equal(gn_json_load_file(path, &root, NULL), 0);
+    assert_true(gn_json_has(&root, "a"));
+    gn_json_finish(&root);
+    close(fds[0]);
+    int status = 1;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+}
+
 static void test_long_path(void **unused)
 {
     (void)unused;
@@ -182,9 +209,9 @@ static void test_long_path(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_values),    cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_texts),     cmocka_unit_test(test_files),
-        cmocka_unit_test(test_long_path),
+        cmocka_unit_test(test_values), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_texts),  cmocka_unit_test(test_files),
+        cmocka_unit_test(test_pipe),   cmocka_unit_test(test_long_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
