@@ -83,8 +83,12 @@ void gn_options_destroy(struct gn_options **options);
 /** Reads "--key value", "--key=value", "--key" (bool), "--no-key" (bool), "--", "-h". */
 GN_MUST_USE int gn_options_read_arguments(struct gn_options *options, int argc, char *const argv[],
                                           struct gn_error *out_error);
-/** environment: as environ. Variables that begin with GNOMON_ and are not ours are refused, but for
- * GNOMON_DATA. */
+/**
+ * environment: as environ. Variables that begin with GNOMON_ and are not in the table are refused,
+ * but for GNOMON_DATA, which the tests take their input from. A program whose table has no plain
+ * section takes no variables and looks at none, so that what is exported for gnomond does not stop
+ * its clients. Two programs with sections would refuse each other's: there is one.
+ */
 GN_MUST_USE int gn_options_read_environment(struct gn_options *options, char *const environment[],
                                             struct gn_error *out_error);
 /** Reads an INI file of at most 1 MiB, lines of at most 190 bytes. */

@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * What options.c (values), options_read.c (file, environment, command line) and options_print.c
- * (help, example) share. Not for others.
+ * What options.c (the table's values), options_value.c (their grammar), options_read.c (file,
+ * environment), options_arguments.c (command line) and options_print.c (help, example) share. Not
+ * for others.
  */
 #ifndef GN_COMMON_OPTIONS_INTERNAL_H
 #define GN_COMMON_OPTIONS_INTERNAL_H
@@ -72,6 +73,10 @@ void gn_option_get_flag(const struct gn_option *option, const char *name, size_t
 bool gn_option_get_variable(const struct gn_option *option, size_t size, char *out_variable);
 /** What a right value looks like: "a whole number in [1, 64]". */
 void gn_option_get_expectation(const struct gn_option *option, size_t size, char *out_text);
+
+/** gn_text_suggest for candidates that do not last: keeps a copy in best, "" where none is near. */
+void gn_option_suggest(const char *name, const char *candidate,
+                       char best[static GN_OPTIONS_MAX_LABEL]);
 
 /** The instance, or NULL. section as in the table, or "room". */
 struct gn_option_instance *gn_options_find(const struct gn_options *options, const char *section,

@@ -119,7 +119,8 @@ void gn_options_print_example(const struct gn_program *program, FILE *out)
     const char *section = NULL;
     snprintf(text, sizeof(text),
              "Configuration of %s: every key, with its default where it has one. Lines that begin "
-             "with '#' or ';' are comments. The environment (GNOMON_SECTION_KEY) wins over this "
+             "with '#' or ';' are comments, and so is what follows a blank and ';'. The "
+             "environment (GNOMON_SECTION_KEY) wins over this "
              "file, the command line over both; %s --help tells the names. Bytes are written as "
              "1048576, 512KiB, 64MiB or 2GiB.",
              program->name, program->name);

@@ -206,25 +206,29 @@ void gn_option_get_expectation(const struct gn_option *option, size_t size, char
         snprintf(out_text, size, "bytes%s, as 1048576, 512KiB, 64MiB or 2GiB", range);
         return;
     case GN_OPTION_ADDRESS:
-        snprintf(out_text, size, "HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7420");
+        snprintf(out_text, size, "HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7340");
         return;
     }
 }
 
-/* The choice that was meant, for the end of the sentence. */
-static void suggest_choice(const struct gn_option *option, const char *text, size_t size, char *out)
+void gn_option_suggest(const char *name, const char *candidate,
+                       char best[static GN_OPTIONS_MAX_LABEL])
 {
-    char choice[64];
-    out[0] = '\0';
-    for (const char *c = option->type == GN_OPTION_ENUM ? option->choices : ""; *c != '\0';) {
+    const char *meant = best[0] == '\0' ? NULL : best;
+    gn_text_suggest(name, candidate, &meant);
+    if (meant == candidate)
+        snprintf(best, GN_OPTIONS_MAX_LABEL, "%s", candidate);
+}
+
+/* The choice that was meant, "" where none is near. */
+static void suggest_choice(const char *choices, const char *text,
+                           char best[static GN_OPTIONS_MAX_LABEL])
+{
+    for (const char *c = choices; *c != '\0';) {
+        char choice[64];
         size_t n = strcspn(c, "|");
-        const char *meant = NULL;
         snprintf(choice, sizeof(choice), "%.*s", (int)n, c);
-        gn_text_suggest(text, choice, &meant);
-        if (meant != NULL) {
-            snprintf(out, size, "; did you mean '%s'?", choice);
-            return;
-        }
+        gn_option_suggest(text, choice, best);
         c += n + (c[n] == '|' ? 1 : 0);
     }
 }
@@ -237,11 +241,14 @@ int gn_options_set(const struct gn_options *options, struct gn_option_instance *
     struct gn_option_value *value = &instance->values[index];
     struct gn_option_value new_value = {.rank = rank, .line = value->line};
     if (!parse_value(option, text, &new_value)) {
-        char expected[256], meant[96];
+        char expected[256], meant[GN_OPTIONS_MAX_LABEL] = "";
         gn_option_get_expectation(option, sizeof(expected), expected);
-        suggest_choice(option, text, sizeof(meant), meant);
-        return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s, found '%.80s'%s", where,
-                            label, expected, option->is_secret ? "(hidden)" : text, meant);
+        if (option->type == GN_OPTION_ENUM)
+            suggest_choice(option->choices, text, meant);
+        return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s, found '%.80s'%s%s%s", where,
+                            label, expected, option->is_secret ? "(hidden)" : text,
+                            meant[0] == '\0' ? "" : "; did you mean '", meant,
+                            meant[0] == '\0' ? "" : "'?");
     }
     if (value->text != NULL && value->rank > rank)
         return 0;

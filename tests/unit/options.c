@@ -19,7 +19,7 @@ static const struct gn_option table[] = {
      .key = "listen",
      .flag = "listen",
      .type = GN_OPTION_ADDRESS,
-     .default_value = "127.0.0.1:7420",
+     .default_value = "127.0.0.1:7340",
      .help = "Where clients connect."},
     {.section = "server",
      .key = "max-sessions",
@@ -80,8 +80,8 @@ static void test_defaults(void **unused)
 {
     (void)unused;
     struct gn_options *o = create();
-    assert_string_equal(gn_options_get_string(o, "server", NULL, "listen"), "127.0.0.1:7420");
-    assert_int_equal(gn_options_get_address(o, "server", NULL, "listen").port, 7420);
+    assert_string_equal(gn_options_get_string(o, "server", NULL, "listen"), "127.0.0.1:7340");
+    assert_int_equal(gn_options_get_address(o, "server", NULL, "listen").port, 7340);
     assert_int_equal(gn_options_get_int(o, "server", NULL, "max-sessions"), 8);
     assert_int_equal(gn_options_get_bytes(o, "http", NULL, "memory"), 64 << 20);
     assert_false(gn_options_get_bool(o, NULL, NULL, "verbose"));
@@ -181,7 +181,7 @@ static void test_ini_errors(void **unused)
         {"[server]\n\n\nmax-sessions = 3\n#\nmax-sessions = 3\n",
          "g.ini:6: max-sessions in [server] is already set in line 4"},
         {"[server]\nlisten = host\n",
-         "g.ini:2: listen in [server]: expected HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7420, found "
+         "g.ini:2: listen in [server]: expected HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7340, found "
          "'host'"},
         {"[http]\nmemory = 2GiB\n",
          "g.ini:2: memory in [http]: expected bytes in [1KiB, 1GiB], as 1048576, 512KiB, 64MiB or "
@@ -295,6 +295,22 @@ static void test_environment_errors(void **unused)
     }
 }
 
+/* Clients run beside a daemon whose variables are exported. */
+static void test_environment_of_others(void **unused)
+{
+    (void)unused;
+    static const struct gn_option flags[] = {{.key = "server", .help = "Where."},
+                                             {.section = "room *", .key = "a", .help = "A."}};
+    static const struct gn_program client = {.name = "p", .options = flags, .n_options = 2};
+    char *const environment[] = {"GNOMON_HTTP_LISTEN=a:1", "GNOMON_NONSENSE=1", NULL};
+    struct gn_options *o = NULL;
+    struct gn_error e = {0};
+    assert_int_equal(gn_options_create(&client, &o), 0);
+    assert_int_equal(gn_options_read_environment(o, environment, &e), 0);
+    assert_string_equal(e.text, "");
+    gn_options_destroy(&o);
+}
+
 static void test_argument_errors(void **unused)
 {
     (void)unused;
@@ -303,12 +319,12 @@ static void test_argument_errors(void **unused)
         {"command line: unknown option '--zzz'; see gnomond --help", "--zzz=3"},
         {"command line: unknown option '-v'; options begin with '--', see gnomond --help", "-v"},
         {"command line: --http lacks its value, expected HOST:PORT or [IPV6]:PORT, as "
-         "127.0.0.1:7420",
+         "127.0.0.1:7340",
          "--http"},
         {"command line: --http lacks its value, expected HOST:PORT or [IPV6]:PORT, as "
-         "127.0.0.1:7420",
+         "127.0.0.1:7340",
          "--http", "--verbose"},
-        {"command line: --http: expected HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7420, found "
+        {"command line: --http: expected HOST:PORT or [IPV6]:PORT, as 127.0.0.1:7340, found "
          "'a:99999'",
          "--http=a:99999"},
         {"command line: --verbose: expected true or false, found 'maybe'", "--verbose=maybe"},
@@ -371,7 +387,7 @@ static void test_visit(void **unused)
         gn_options_read_text(o, "[room a]\nscene=s\n[server]\ntoken=t\n", "g.ini", NULL), 0);
     gn_options_visit(o, collect, text);
     assert_string_equal(text, "||verbose|no|default\n"
-                              "server||listen|127.0.0.1:7420|default\n"
+                              "server||listen|127.0.0.1:7340|default\n"
                               "server||max-sessions|8|default\n"
                               "server||token|(hidden)|g.ini:4\n"
                               "http||memory|64MiB|default\n"
@@ -452,12 +468,19 @@ static void test_addresses(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),        cmocka_unit_test(test_precedence),
-        cmocka_unit_test(test_ini_errors),      cmocka_unit_test(test_long_lines),
-        cmocka_unit_test(test_files),           cmocka_unit_test(test_environment_errors),
-        cmocka_unit_test(test_argument_errors), cmocka_unit_test(test_secret),
-        cmocka_unit_test(test_visit),           cmocka_unit_test(test_help),
-        cmocka_unit_test(test_example),         cmocka_unit_test(test_addresses),
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_precedence),
+        cmocka_unit_test(test_ini_errors),
+        cmocka_unit_test(test_long_lines),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_environment_errors),
+        cmocka_unit_test(test_environment_of_others),
+        cmocka_unit_test(test_argument_errors),
+        cmocka_unit_test(test_secret),
+        cmocka_unit_test(test_visit),
+        cmocka_unit_test(test_help),
+        cmocka_unit_test(test_example),
+        cmocka_unit_test(test_addresses),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
