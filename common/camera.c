@@ -115,11 +115,11 @@ int gn_camera_check(const struct gn_camera *camera, const char **out_reason)
     struct gn_pose pose = camera->world_from_camera;
     if (gn_pose_normalize(&pose) < 0)
         reason = "world_from_camera must be finite, its quaternion a unit one";
-    if (reason != NULL) {
+    if (reason == NULL)
+        return gn_response_check(&camera->response, out_reason);
+    if (out_reason != NULL)
         *out_reason = reason;
-        return -EINVAL;
-    }
-    return gn_response_check(&camera->response, out_reason);
+    return -EINVAL;
 }
 
 bool gn_camera_get_ray(const struct gn_camera *camera, double x, double y,

@@ -26,7 +26,9 @@ struct gn_camera {
     struct gn_pose world_from_camera;
 };
 
-/** Checks every range and finiteness. Returns 0, or -EINVAL and a static sentence in *out_reason.
+/**
+ * Checks every range and finiteness. Returns 0, or -EINVAL and a sentence (static string) in
+ * *out_reason (may be NULL).
  */
 GN_MUST_USE int gn_camera_check(const struct gn_camera *camera, const char **out_reason);
 

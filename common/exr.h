@@ -44,7 +44,10 @@ GN_MUST_USE int gn_exr_get_info(const void *data, size_t size, struct gn_exr_inf
 GN_MUST_USE int gn_exr_read_memory(const void *data, size_t size, struct gn_image *out_image,
                                    bool *out_saturated, struct gn_error *out_error);
 
-/** As gn_exr_read_memory, from a file, DWA and subsampled chroma too. */
+/**
+ * As gn_exr_read_memory, from a file, DWA and subsampled chroma too. Thread-safety: safe, but that
+ * OpenEXR keeps one message for all threads that fail on such files.
+ */
 GN_MUST_USE int gn_exr_read_file(const char *path, struct gn_image *out_image, bool *out_saturated,
                                  struct gn_error *out_error);
 

@@ -195,7 +195,7 @@ int gn_hdr_read_memory(const void *data, size_t size, struct gn_image *out_image
     const char *reason = parse_header(&c, &h);
     if (reason)
         return gn_error_set(out_error, -EINVAL, "bad Radiance picture: %s", reason);
-    /* 127 pixels or a run of 255 old ones take at least 4 bytes: no picture out of nothing. */
+    /* No scanline takes less than 4 bytes: no picture out of nothing. */
     if (h.width < 1 || h.height < 1 || (size_t)h.layout.n_scans > c.n / 4)
         return gn_error_set(out_error, -EINVAL,
                             "bad Radiance picture: %d x %d px cannot be in %zu bytes", h.width,

@@ -30,7 +30,7 @@ struct gn_image_file {
 
 /**
  * Reads EXR, Radiance, PNG or JPEG, up to 1 GiB. Returns 0, or a negative errno and one sentence
- * with the path; *out_file is zeroed then. Thread-safety: safe.
+ * with the path; *out_file is zeroed then. Thread-safety: as gn_exr_read_file.
  */
 GN_MUST_USE int gn_image_read_file(const char *path, struct gn_image_file *out_file,
                                    struct gn_error *out_error);

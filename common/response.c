@@ -79,7 +79,7 @@ static const char *check(const struct gn_response *r)
     if (r->type == GN_RESPONSE_LOG &&
         !(isfinite(r->log_a) && isfinite(r->log_b) && r->log_b > 0 && isfinite(r->log_c) &&
           r->log_c >= 0 && (1 - r->log_a) / r->log_b < 80))
-        return "a log response needs finite a, b > 0, c >= 0, and exp((1 - a) / b) below 1e34";
+        return "a log response needs finite a, b > 0, c >= 0, and (1 - a) / b below 80";
     if (!(r->scale >= 0 && isfinite(r->scale)))
         return "a response's scale must be finite and not negative";
     double inverse[9];

@@ -33,7 +33,9 @@ struct gn_response {
     double scale;        // radiance per linear unit, >= 0; 0: 1
 };
 
-/** Checks ranges. Returns 0, or -EINVAL and a sentence (static string) in *out_reason. */
+/** Checks ranges. Returns 0, or -EINVAL and a sentence (static string) in *out_reason (may be
+ * NULL).
+ */
 GN_MUST_USE int gn_response_check(const struct gn_response *response, const char **out_reason);
 
 /** "linear", "srgb", "gamma", "log", "table"; NULL for a bad type. */

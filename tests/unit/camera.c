@@ -185,6 +185,9 @@ static void test_check(void **unused)
     camera = make(1);
     camera.response.type = GN_RESPONSE_GAMMA; // gamma 0
     assert_int_equal(gn_camera_check(&camera, &reason), -EINVAL);
+    assert_int_equal(gn_camera_check(&camera, NULL), -EINVAL);
+    camera.width = 0;
+    assert_int_equal(gn_camera_check(&camera, NULL), -EINVAL);
 }
 
 #define SIZES "\"width\":640,\"height\":480,\"fx\":520,\"fy\":521,\"cx\":320.5,\"cy\":240"

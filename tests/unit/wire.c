@@ -374,6 +374,16 @@ static void test_defaults(void **state)
     assert_false(out.frame.views[0].has_world_from_camera);
 }
 
+static void test_nul_ends_a_string(void **state)
+{
+    (void)state;
+    // version_min 1, version_max 1, room "a\0b", role 2
+    const uint8_t header[] = {0x08, 1, 0x10, 1, 0x3a, 3, 'a', 0, 'b', 0x40, 2};
+    union gn_wire_message m;
+    assert_int_equal(gn_wire_decode(GN_WIRE_HELLO, header, sizeof(header), 0, &m, NULL), 0);
+    assert_string_equal(m.hello.room, "a");
+}
+
 /** A client that computes in float32 means pi by a little more than pi. */
 static void test_theta_max_of_a_float(void **state)
 {
@@ -544,6 +554,7 @@ int main(void)
         cmocka_unit_test(test_values_out_of_range),
         cmocka_unit_test(test_bad_structs_are_not_encoded),
         cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_nul_ends_a_string),
         cmocka_unit_test(test_theta_max_of_a_float),
         cmocka_unit_test(test_envelope),
         cmocka_unit_test(test_limits_hold_at_the_byte),
