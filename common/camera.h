@@ -3,7 +3,8 @@
 /*
  * The pinhole camera with Brown-Conrady distortion that takes the pictures virtual objects are
  * composited into. Camera frame: x right, y down, z along the optical axis. Pixel centres at
- * half-integers, so the principal point of an ideal w x h camera is (w/2, h/2).
+ * half-integers, so the principal point of an ideal w x h camera is (w/2, h/2). Thread-safety of
+ * all functions: safe.
  */
 #ifndef GN_COMMON_CAMERA_H
 #define GN_COMMON_CAMERA_H

@@ -2,7 +2,7 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * Devices described in JSON: what camera.json, sequence.json and a probe's setup have in common.
- * The formats are documented in docs/frames.md.
+ * The formats are documented in docs/frames.md. Thread-safety: as the JSON's, unsafe.
  */
 #ifndef GN_COMMON_DEVICE_JSON_H
 #define GN_COMMON_DEVICE_JSON_H

@@ -9,7 +9,7 @@
 
 #include "proto/attr.h"
 
-/** A value; zero it before use. */
+/** A value; zero it before use. Thread-safety: unsafe. */
 struct gn_error {
     char text[512]; // NUL-terminated, cut where too long; control characters replaced by '?'
 };

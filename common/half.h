@@ -2,7 +2,7 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * 16-bit floats (IEEE 754 binary16) to 32 bits and back, exact, denormals, infinities and NaN
- * included. Plain integer arithmetic: the same bits everywhere.
+ * included. Plain integer arithmetic: the same bits everywhere. Thread-safety: safe.
  */
 #ifndef GN_COMMON_HALF_H
 #define GN_COMMON_HALF_H

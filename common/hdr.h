@@ -3,7 +3,7 @@
 /*
  * Radiance RGBE pictures (.hdr, .pic) to linear float RGB and back. Source of the format:
  * Radiance's file format notes, "Picture File Format (.hdr)", and Ward, Real Pixels, Graphics Gems
- * II, 1991.
+ * II, 1991. Thread-safety of all functions: safe.
  */
 #ifndef GN_COMMON_HDR_H
 #define GN_COMMON_HDR_H

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * Listening sockets, and addresses as text.
+ * Listening sockets, and addresses as text. Thread-safety: safe.
  */
 #ifndef GN_COMMON_LISTEN_H
 #define GN_COMMON_LISTEN_H

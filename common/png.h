@@ -2,7 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * PNG pictures as codes: 8 bits gray, RGB, RGBA and 16 bits gray, RGB, just as they are stored (no
- * gamma, no colour profile), so 12-bit sensor codes survive in 16 bits.
+ * gamma, no colour profile), so 12-bit sensor codes survive in 16 bits. Thread-safety of all
+ * functions: safe.
  */
 #ifndef GN_COMMON_PNG_H
 #define GN_COMMON_PNG_H

@@ -3,7 +3,7 @@
 /*
  * Rigid poses and 4x4 matrices in double. Names say the frames: world_from_camera maps a point in
  * camera coordinates to world coordinates. Matrices are row-major, double m[16], last row 0 0 0 1.
- * Axes of every frame: docs/frames.md.
+ * Axes of every frame: docs/frames.md. Thread-safety of all functions: safe.
  */
 #ifndef GN_COMMON_POSE_H
 #define GN_COMMON_POSE_H

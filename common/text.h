@@ -2,7 +2,7 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * Small helpers on text that comes from outside: making it fit to print, and finding the name that
- * was meant. Shared by errors, log, options and JSON.
+ * was meant. Shared by errors, log, options and JSON. Thread-safety of all functions: safe.
  */
 #ifndef GN_COMMON_TEXT_H
 #define GN_COMMON_TEXT_H
