@@ -75,11 +75,23 @@ static uint32_t get_bits(float value)
     return bits;
 }
 
+/* The linear value from which on the code is this one; infinity where none has it. */
+static float find_edge(const struct gn_response *response, int code)
+{
+    float edge = gn_response_decode(response, ((float)code - 0.5f) / 255);
+    const float least = (float)code - 0.501f; // 0.001: rounding in encode
+    /* Where a table is flat, encode gives the lowest code of the flat part; the others begin above.
+     */
+    if (gn_response_encode(response, edge) * 255 < least)
+        edge = nextafterf(edge, INFINITY);
+    return gn_response_encode(response, edge) * 255 < least ? INFINITY : edge;
+}
+
 static void init_encoder(const struct gn_response *response, struct encoder *out)
 {
     out->edges[0] = 0;
     for (int k = 1; k < 256; k++)
-        out->edges[k] = gn_response_decode(response, ((float)k - 0.5f) / 255);
+        out->edges[k] = find_edge(response, k);
     out->edges[256] = INFINITY;
     int code = 0;
     for (uint32_t i = 0; i < GUIDE_SIZE; i++) {

@@ -133,7 +133,9 @@ static void test_formula(void **state)
 static void test_codes_of_curves(void **state)
 {
     struct fixture *f = *state;
+    static const float flat[] = {0, 0, 0.01f, 0.01f, 0.01f, 1, 1};
     static const struct gn_response responses[] = {
+        {.type = GN_RESPONSE_TABLE, .table = flat, .table_size = 7},
         {.type = GN_RESPONSE_LINEAR, .scale = 3},
         {.type = GN_RESPONSE_SRGB},
         {.type = GN_RESPONSE_SRGB, .to_rec709 = {0.8, 0.2, 0, 0.1, 0.9, 0, 0, 0.3, 0.7}},
@@ -143,8 +145,10 @@ static void test_codes_of_curves(void **state)
     for (size_t r = 0; r < sizeof(responses) / sizeof(responses[0]); r++) {
         for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
             f->rgba.data[i / 3 * 4 + 3] = 1;
-            // Seven decades, and what lies beyond both ends.
-            f->rgba.data[i / 3 * 4 + i % 3] = i < 9 ? 0 : powf(10, (float)(i % 701) / 100 - 6);
+            // Seven decades, what lies beyond both ends, and where the table is flat.
+            f->rgba.data[i / 3 * 4 + i % 3] = i < 9    ? 0
+                                              : i < 18 ? 0.01f
+                                                       : powf(10, (float)(i % 701) / 100 - 6);
         }
         assert_int_equal(
             gn_composite_image8(&f->layers, &f->background, &responses[r], false, NULL, &f->out),
