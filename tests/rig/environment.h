@@ -89,8 +89,8 @@ GN_MUST_USE int gn_rig_turn_map(const struct gn_image *map, double turn, struct 
 
 /**
  * The lamp room: a box of four walls, a ceiling and a floor, with lamps 0 .. n_lamps - 1 switched
- * on, each a disc of a few degrees that also lights the walls around it. Radiance of 4 x 4 points a
- * texel, averaged. Returns 0, -EINVAL, -ENOMEM.
+ * on, each a disc of a few degrees that also lights the walls around it. A texel has the mean
+ * of 8 x 8 points near a lamp, else the radiance of its centre. Returns 0, -EINVAL, -ENOMEM.
  */
 GN_MUST_USE int gn_rig_paint_lamp_room(int width, int height, int n_lamps, struct gn_pool *pool,
                                        struct gn_image *out_map);

@@ -101,6 +101,18 @@ static void see_room(const double dir[static 3], int n_lamps, double out_radianc
         out_radiance[k] = albedo[k] * light[k] / GN_RIG_PI;
 }
 
+/* Whether a lamp, or its rim, comes within `margin` rad of dir. */
+static bool is_near_lamp(const double dir[static 3], int n_lamps, double margin)
+{
+    for (int i = 0; i < n_lamps; i++) {
+        double at[3];
+        get_lamp_axis(&lamps[i], at);
+        if (vec_dot(at, dir) > cos(lamps[i].radius_deg * GN_RIG_PI / 180 + margin))
+            return true;
+    }
+    return false;
+}
+
 struct paint_job {
     struct gn_image *map;
     int n_lamps;
@@ -113,13 +125,17 @@ static void paint_row(void *context, int y, int worker)
     (void)worker;
     for (int x = 0; x < w; x++) {
         double sum[3] = {0};
-        for (int i = 0; i < 16; i++) {
-            double theta = GN_RIG_PI * (y + (i / 4 + 0.5) / 4) / h, rgb[3];
-            double phi = GN_RIG_PI - 2 * GN_RIG_PI * (x + (i % 4 + 0.5) / 4) / w;
-            double dir[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
+        const double theta = GN_RIG_PI * (y + 0.5) / h,
+                     phi = GN_RIG_PI - 2 * GN_RIG_PI * (x + 0.5) / w;
+        const double middle[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
+        int n = is_near_lamp(middle, job->n_lamps, 2 * GN_RIG_PI / h) ? 8 : 1;
+        for (int i = 0; i < n * n; i++) {
+            double t = GN_RIG_PI * (y + (i / n + 0.5) / n) / h, rgb[3];
+            double p = GN_RIG_PI - 2 * GN_RIG_PI * (x + (i % n + 0.5) / n) / w;
+            const double dir[3] = {sin(t) * cos(p), sin(t) * sin(p), cos(t)};
             see_room(dir, job->n_lamps, rgb);
             for (int k = 0; k < 3; k++)
-                sum[k] += rgb[k] / 16;
+                sum[k] += rgb[k] / (n * n);
         }
         for (int k = 0; k < 3; k++)
             gn_image_at(job->map, x, y)[k] = (float)sum[k];

@@ -116,6 +116,34 @@ static void test_furnace(void **state)
     gn_rig_room_finish(&room);
 }
 
+/* Lamps and walls on a bare plane: albedo / pi times the irradiance that the map's sum gives. */
+static void test_lamps(void **state)
+{
+    struct gn_rig_room room = {0};
+    struct gn_rig_environment env;
+    struct gn_image map;
+    struct gn_rig_view view = make_view(8, 4000, 0.5, 0.5);
+    struct gn_rig_render_options options = {.batch_size = 256};
+    struct gn_rig_pictures p;
+    const double up[3] = {0, 0, 1};
+    double rgb[3], error;
+    (void)state;
+    assert_int_equal(gn_rig_paint_lamp_room(512, 256, 3, NULL, &map), 0);
+    assert_int_equal(gn_rig_environment_init(&map, 0, &env, NULL), 0);
+    add(&room, GN_RT_REAL, GN_RIG_DIFFUSE, gn_test_make_plane(200, 1), 0, 0.5);
+    assert_int_equal(gn_rig_room_commit(&room, NULL, NULL), 0);
+    assert_int_equal(gn_rig_render(&room, &env, &view, &options, NULL, &p, NULL), 0);
+    gn_rig_environment_get_irradiance(&env, up, rgb);
+    double found = get_mean(&p.mean[GN_RIG_TRUTH], &p.error[GN_RIG_TRUTH], &error);
+    double expected = 0.5 / GN_RIG_PI * rgb[1];
+    print_message("# lamps: %.5f +- %.5f of %.5f\n", found, error, expected);
+    assert_true(error < 1e-3 * expected);
+    assert_true(fabs(found - expected) < 3 * error + 1e-3 * expected);
+    gn_rig_pictures_finish(&p);
+    gn_rig_environment_finish(&env);
+    gn_rig_room_finish(&room);
+}
+
 /* A mirror shows the sky times its reflectance, with no noise. */
 static void test_mirror(void **state)
 {
@@ -190,9 +218,8 @@ static void test_demo_room(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sphere_shadow),
-        cmocka_unit_test(test_furnace),
-        cmocka_unit_test(test_mirror),
+        cmocka_unit_test(test_sphere_shadow), cmocka_unit_test(test_furnace),
+        cmocka_unit_test(test_lamps),         cmocka_unit_test(test_mirror),
         cmocka_unit_test(test_demo_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
