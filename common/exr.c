@@ -77,7 +77,7 @@ struct reader {
     exr_context_t context;
     exr_attr_box2i_t window;
     exr_storage_t storage;
-    bool is_dwa;
+    exr_compression_t compression;
     const exr_attr_chlist_t *channels;
     struct gn_exr_info info;
 };
@@ -103,18 +103,27 @@ static int check_size(struct reader *r, struct gn_error *out_error)
                             GN_IMAGE_MAX_PIXELS);
     r->info.width = (int)width;
     r->info.height = (int)height;
-    uint64_t bytes_per_pixel = 0;
-    r->info.is_core = !r->is_dwa;
+    uint64_t n_bytes = 0;
+    bool is_dwa = r->compression == EXR_COMPRESSION_DWAA || r->compression == EXR_COMPRESSION_DWAB;
+    r->info.is_core = !is_dwa;
     for (int i = 0; i < r->channels->num_channels; i++) {
         const exr_attr_chlist_entry_t *c = &r->channels->entries[i];
-        bytes_per_pixel += c->pixel_type == EXR_PIXEL_HALF ? 2 : 4;
+        uint64_t channel_bytes =
+            (uint64_t)(width * height) * (c->pixel_type == EXR_PIXEL_HALF ? 2 : 4);
         if (c->x_sampling != 1 || c->y_sampling != 1)
             r->info.is_core = false;
+        if (c->x_sampling > 1)
+            channel_bytes /= (uint64_t)c->x_sampling;
+        if (c->y_sampling > 1)
+            channel_bytes /= (uint64_t)c->y_sampling;
+        n_bytes += channel_bytes;
     }
-    /* Deflate, the tightest of the codecs, makes at most 1032 bytes of one; DWA packs 64 into 1
-     * before it deflates. */
-    uint64_t n_bytes = (uint64_t)(width * height) * bytes_per_pixel;
-    if (n_bytes / (r->is_dwa ? 64 * 1032 : 1032) > r->stream.size)
+    /* Deflate, the tightest of the codecs, makes at most 1032 bytes of one; before it deflates,
+     * PXR24 packs 4 into 3 and DWA 64 into 1. */
+    uint64_t ratio = is_dwa                                    ? 64 * 1032
+                     : r->compression == EXR_COMPRESSION_PXR24 ? 1032 / 3 * 4
+                                                               : 1032;
+    if (n_bytes / ratio > r->stream.size)
         return gn_error_set(out_error, -EINVAL, "EXR picture: %jd x %jd px cannot be in %ju bytes",
                             (intmax_t)width, (intmax_t)height, (uintmax_t)r->stream.size);
     if (n_bytes > MAX_SAMPLE_BYTES)
@@ -140,7 +149,6 @@ static int open_reader(struct reader *r, const void *data, size_t size, struct g
     init.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
 
     int status;
-    exr_compression_t compression = EXR_COMPRESSION_NONE;
     exr_result_t code = exr_start_read(&r->context, "memory", &init);
     if (!code)
         code = exr_get_storage(r->context, 0, &r->storage);
@@ -149,7 +157,7 @@ static int open_reader(struct reader *r, const void *data, size_t size, struct g
     if (!code)
         code = exr_get_channels(r->context, 0, &r->channels);
     if (!code)
-        code = exr_get_compression(r->context, 0, &compression);
+        code = exr_get_compression(r->context, 0, &r->compression);
     if (code) {
         status = gn_exr_set_error(&r->stream, code, "bad EXR picture", out_error);
         goto fail;
@@ -159,7 +167,6 @@ static int open_reader(struct reader *r, const void *data, size_t size, struct g
                               "EXR picture: deep data; only scanlines and tiles are read");
         goto fail;
     }
-    r->is_dwa = compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB;
     status = check_size(r, out_error);
     if (status)
         goto fail;

@@ -16,6 +16,7 @@
 
 #include <ImfCRgbaFile.h>
 #include <cmocka.h>
+#include <openexr.h>
 
 #include "common/file.h"
 #include "common/half.h"
@@ -103,6 +104,48 @@ static void test_half_and_luminance(void **state)
     unlink(path);
 }
 
+/* Changes the header's byte. */
+static void set_compression(uint8_t *data, exr_compression_t compression)
+{
+    static const char key[] = "compression\0compression\0\1\0\0";
+    while (memcmp(data, key, sizeof(key)) != 0)
+        data++;
+    data[sizeof(key)] = (uint8_t)compression;
+}
+
+/* How few bytes a size in pixels may have depends on how tightly its compression can pack. */
+static void test_bytes_for_size(void **state)
+{
+    (void)state;
+    static const struct {
+        exr_compression_t compression;
+        size_t ratio; // of samples to file, in bytes
+        int result;
+    } cases[] = {
+        {EXR_COMPRESSION_ZIP, 1000, 0},         {EXR_COMPRESSION_ZIP, 1100, -EINVAL},
+        {EXR_COMPRESSION_PXR24, 1318, 0}, // a black picture's
+        {EXR_COMPRESSION_PXR24, 1400, -EINVAL}, {EXR_COMPRESSION_DWAA, 10000, 0},
+    };
+    const int width = 8192, height = 512;
+    float *black = calloc((size_t)(width * height), sizeof(*black));
+    uint8_t *data;
+    size_t size, n_bytes = (size_t)(width * height) * sizeof(*black);
+    assert_non_null(black);
+    struct gn_exr_channel y = {.name = "Y", .data = black, .stride = 1};
+    assert_int_equal(gn_exr_write_file(path, width, height, &y, 1, NULL), 0);
+    assert_int_equal(gn_file_read(path, 1 << 20, &data, &size, NULL), 0);
+    for (size_t i = 0; i < GN_ARRAY_LEN(cases); i++) {
+        struct gn_exr_info info;
+        assert_true(n_bytes / cases[i].ratio <= size);
+        set_compression(data, cases[i].compression);
+        assert_int_equal(gn_exr_get_info(data, n_bytes / cases[i].ratio, &info, NULL),
+                         cases[i].result);
+    }
+    free(data);
+    free(black);
+    unlink(path);
+}
+
 static void test_memory(void **state)
 {
     (void)state;
@@ -123,12 +166,7 @@ static void test_memory(void **state)
     assert_int_equal(gn_exr_read_memory(data, size, &image, NULL, NULL), 0);
     assert_memory_equal(image.data, rgb, sizeof(rgb));
     gn_image_finish(&image);
-    /* The compression's byte set to DWAA: refused from memory, with the reason. */
-    static const char key[] = "compression\0compression\0\1\0\0";
-    uint8_t *at = data;
-    while (memcmp(at, key, sizeof(key)) != 0)
-        at++;
-    at[sizeof(key)] = 8;
+    set_compression(data, EXR_COMPRESSION_DWAA); // refused from memory, with the reason
     struct gn_error error = {0};
     assert_int_equal(gn_exr_read_memory(data, size, &image, NULL, &error), -ENOTSUP);
     assert_non_null(strstr(error.text, "DWA"));
@@ -198,9 +236,9 @@ static void test_write_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_layers),         cmocka_unit_test(test_half_and_luminance),
-        cmocka_unit_test(test_memory),         cmocka_unit_test(test_dwa_by_name),
-        cmocka_unit_test(test_write_refusals),
+        cmocka_unit_test(test_layers),      cmocka_unit_test(test_half_and_luminance),
+        cmocka_unit_test(test_memory),      cmocka_unit_test(test_bytes_for_size),
+        cmocka_unit_test(test_dwa_by_name), cmocka_unit_test(test_write_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
