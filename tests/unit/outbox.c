@@ -129,7 +129,12 @@ static void test_mailbox(void **state)
     gn_mailbox_recycle(mailbox, &first);
     gn_mailbox_recycle(mailbox, &second);
     assert_null(gn_mailbox_take_all(mailbox));
-    gn_mailbox_post(mailbox, make_note(GN_WIRE_PONG, 3)); // freed with the mailbox
+    gn_mailbox_post(mailbox, make_note(GN_WIRE_PONG, 3));
+    struct gn_note *third = gn_mailbox_take_all(mailbox);
+    assert_non_null(third);
+    assert_int_equal(third->body.pong.t1_ns, 3);
+    gn_mailbox_recycle(mailbox, &third);
+    gn_mailbox_post(mailbox, make_note(GN_WIRE_PONG, 4)); // freed with the mailbox
 }
 
 /** The table of session.h, written apart from the code. */
@@ -166,6 +171,7 @@ static void test_buf_pool(void **state)
     assert_int_equal(a->len, 900);
     assert_int_equal(gn_buf_pool_get(pool, 1000, &b), 0);
     assert_ptr_not_equal(b->data, data);
+    data = b->data;
     gn_buf_unref(&b);
     assert_int_equal(gn_buf_pool_get(pool, 10, &b), 0); // far smaller: a large one is not held
     assert_ptr_not_equal(b->data, data);
