@@ -90,6 +90,8 @@ static void start_closing(struct gn_session *s, int64_t now_ns)
 
 static void put_note(struct gn_session *s, struct gn_note *note)
 {
+    if (!gn_session_wants_write(s)) // until now there was nothing that the peer could have taken
+        s->moved_ns = gn_clock_get_monotonic_ns();
     if (gn_outbox_put(&s->outbox, s->host->mailbox, note) == 0)
         return;
     gn_mailbox_recycle(s->host->mailbox, &note);

@@ -61,7 +61,7 @@ def test_one_outstanding_loses_nothing():
     """At the rate that the server states, with one frame outstanding, nothing is dropped."""
     with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 640, 480) as viewer:
         light_up(light)
-        for _ in range(12):
+        for _ in range(5):
             viewer.expect_result(viewer.send_frame(lighting_min_sequence=1,
                                                    lighting_wait_ms=20000))
         with Client(daemon, pb.ROLE_VIEWER) as other:  # two viewers now: half for each
@@ -70,7 +70,7 @@ def test_one_outstanding_loses_nothing():
         other.close()
         interval, due = 1 / (2 * share), time.monotonic()
         print('# holds %.1f frames/s at 640x480' % (2 * share))
-        for _ in range(min(60, int(4 / interval) + 2)):
+        for _ in range(min(60, int(3 / interval) + 2)):
             time.sleep(max(0, due - time.monotonic()))
             due = max(due + interval, time.monotonic())
             viewer.expect_result(viewer.send_frame())
