@@ -1,0 +1,190 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* What a viewer leaves on disk: pictures to the bit, view.json whole or absent. */
+#include <errno.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "client/view/record.h"
+#include "common/file.h"
+#include "common/image_file.h"
+#include "tests/unit/cmocka_setup.h"
+
+static const char dir[] = "unit_record.tmp";
+static const char report[] = "unit_record.tmp/view.json";
+static const uint8_t pixels[18] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 255};
+
+static int clean(void **state)
+{
+    (void)state;
+    return system("rm -rf unit_record.tmp");
+}
+
+static struct gn_msg_result make_result(uint64_t id)
+{
+    struct gn_msg_result result = {.id = id, .views_count = 1, .has_receipt = true};
+    result.views[0] = (struct gn_msg_result_view){.format = GN_MSG_PICTURE_FORMAT_RGB8,
+                                                  .width = 3,
+                                                  .height = 2,
+                                                  .payload_length = sizeof(pixels)};
+    result.receipt.primary_ms = 1.5f;
+    result.receipt.lighting_sequence = 42;
+    result.receipt.lights_used = 64;
+    result.receipt.rays_shadow = 1000;
+    result.receipt.estimated_error = -1;
+    result.receipt.left_out_count = 1;
+    strcpy(result.receipt.left_out[0].pass, "bounce");
+    strcpy(result.receipt.left_out[0].why, "not \xff UTF-8");
+    return result;
+}
+
+static struct gn_record *open_record(void)
+{
+    struct gn_record *record = NULL;
+    struct gn_error error = {0};
+    if (gn_record_open(dir, &record, &error) != 0)
+        fail_msg("%s", error.text);
+    return record;
+}
+
+static json_t *load(void)
+{
+    json_error_t fault;
+    json_t *root = json_load_file(report, 0, &fault);
+    if (!root)
+        fail_msg("%s:%d: %s", report, fault.line, fault.text);
+    assert_string_equal(json_string_value(json_object_get(root, "format")), "gnomon-view 1");
+    return root;
+}
+
+static json_int_t get_int(const json_t *object, const char *key)
+{
+    assert_true(json_is_integer(json_object_get(object, key)));
+    return json_integer_value(json_object_get(object, key));
+}
+
+static void test_run(void **state)
+{
+    (void)state;
+    struct gn_record *record = open_record();
+    struct gn_msg_result result = make_result(1);
+    // Two eyes in one payload: the second in front.
+    uint8_t payload[36] = {0};
+    memcpy(payload + 18, pixels, 18);
+    result.views_count = 2;
+    result.views[1] = result.views[0];
+    result.views[0].payload_offset = 18;
+    assert_int_equal(gn_record_add_result(record, "a", &result, payload, 12.5, NULL), 0);
+    struct gn_msg_dropped dropped = {.id = 2, .reason = GN_MSG_DROP_REASON_SUPERSEDED};
+    strcpy(dropped.sentence, "a later frame came");
+    assert_int_equal(gn_record_add_dropped(record, "b\xff", &dropped, NULL), 0);
+    assert_int_not_equal(access(report, F_OK), 0); // whole or absent
+    assert_int_equal(gn_record_close(&record, 3, false, NULL), 0);
+    assert_null(record);
+    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+
+    struct gn_image_file file;
+    assert_int_equal(gn_image_read_file("unit_record.tmp/a.png", &file, NULL), 0);
+    assert_true(file.codes8.width == 3 && file.codes8.height == 2 && file.codes8.channels == 3);
+    assert_memory_equal(file.codes8.data, pixels, 18);
+    gn_image_file_finish(&file);
+    assert_int_equal(gn_image_read_file("unit_record.tmp/a-1.png", &file, NULL), 0);
+    assert_memory_equal(file.codes8.data, payload, 18);
+    gn_image_file_finish(&file);
+
+    json_t *root = load();
+    assert_true(get_int(root, "sent") == 3 && get_int(root, "results") == 1 &&
+                get_int(root, "dropped") == 1);
+    assert_true(json_is_false(json_object_get(root, "complete")));
+    const json_t *frames = json_object_get(root, "frames");
+    assert_int_equal(json_array_size(frames), 2);
+    const json_t *a = json_array_get(frames, 0), *b = json_array_get(frames, 1);
+    assert_true(json_real_value(json_object_get(a, "latency_ms")) == 12.5);
+    const json_t *receipt = json_object_get(a, "receipt");
+    assert_true(get_int(receipt, "lighting_sequence") == 42 && get_int(receipt, "lights") == 64);
+    assert_true(json_is_null(json_object_get(receipt, "estimated_error")));
+    assert_int_equal(get_int(json_object_get(receipt, "rays"), "shadow"), 1000);
+    const json_t *left_out = json_array_get(json_object_get(receipt, "left_out"), 0);
+    assert_string_equal(json_string_value(json_object_get(left_out, "why")), "not ? UTF-8");
+    assert_string_equal(json_string_value(json_object_get(b, "name")), "b?");
+    assert_string_equal(json_string_value(json_object_get(b, "sentence")), "a later frame came");
+    json_decref(root);
+}
+
+static void test_empty_and_again(void **state)
+{
+    (void)state;
+    struct gn_record *record = open_record();
+    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+    json_t *root = load();
+    assert_int_equal(json_array_size(json_object_get(root, "frames")), 0);
+    assert_true(json_is_true(json_object_get(root, "complete")));
+    json_decref(root);
+    record = open_record(); // the old report is gone while the new run lasts
+    assert_int_not_equal(access(report, F_OK), 0);
+    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+    assert_int_equal(access(report, F_OK), 0);
+}
+
+static void test_jpeg(void **state)
+{
+    (void)state;
+    static const uint8_t bytes[] = {0xff, 0xd8, 0xff, 0xe0, 9, 9};
+    struct gn_record *record = open_record();
+    struct gn_msg_result result = make_result(1);
+    result.views[0].format = GN_MSG_PICTURE_FORMAT_JPEG;
+    result.views[0].payload_length = sizeof(bytes);
+    assert_int_equal(gn_record_add_result(record, "a", &result, bytes, 1, NULL), 0);
+    uint8_t *data = NULL;
+    size_t n = 0;
+    assert_int_equal(gn_file_read("unit_record.tmp/a.jpg", 100, &data, &n, NULL), 0);
+    assert_int_equal(n, sizeof(bytes));
+    assert_memory_equal(data, bytes, n);
+    free(data);
+    assert_int_equal(gn_record_close(&record, 1, true, NULL), 0);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    struct gn_record *record = open_record();
+    struct gn_error error = {0};
+    struct gn_msg_result result = make_result(1);
+    result.views[0].payload_length = 17;
+    assert_int_equal(gn_record_add_result(record, "a", &result, pixels, 1, &error), -EPROTO);
+    assert_non_null(strstr(error.text, "17 bytes, not 18"));
+    result.views[0].format = GN_MSG_PICTURE_FORMAT_JPEG;
+    assert_int_equal(gn_record_add_result(record, "a", &result, pixels, 1, &error), -EPROTO);
+    assert_non_null(strstr(error.text, "the server's JPEG is none"));
+    result = make_result(1);
+    assert_int_equal(gn_record_add_result(record, "no/such", &result, pixels, 1, &error), -ENOENT);
+    assert_non_null(strstr(error.text, "no/such.png"));
+    assert_int_equal(gn_record_close(&record, 1, true, &error), 0);
+    json_t *root = load(); // what was refused is not in it
+    assert_int_equal(json_array_size(json_object_get(root, "frames")), 0);
+    json_decref(root);
+
+    assert_int_equal(gn_record_open("unit_record.none/deep", &record, &error), -ENOENT);
+    assert_non_null(strstr(error.text, "cannot be the folder of results"));
+    assert_int_equal(gn_record_open(report, &record, &error), -ENOTDIR);
+    char name[5000];
+    memset(name, 'n', sizeof(name) - 1);
+    name[sizeof(name) - 1] = '\0';
+    assert_int_equal(gn_record_open(name, &record, &error), -ENAMETOOLONG);
+    assert_null(record);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_run, clean, clean),
+        cmocka_unit_test_setup_teardown(test_empty_and_again, clean, clean),
+        cmocka_unit_test_setup_teardown(test_jpeg, clean, clean),
+        cmocka_unit_test_setup_teardown(test_refusals, clean, clean),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
