@@ -34,6 +34,7 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_ENUM,
      .choices = "latlong|angular|mirrorball|fisheye-equidistant|fisheye-equisolid|"
                 "fisheye-orthographic|fisheye-stereographic",
+     .value_name = "NAME",
      .help = "Instead of --setup, where everything else is at its default."},
     {.key = "first-sequence",
      .flag = "first-sequence",

@@ -99,8 +99,9 @@ void gn_options_print_help(const struct gn_program *program, FILE *out)
         describe(option, sizeof(text), text);
         print_wrapped(out, indent, indent, text);
         if (gn_option_get_variable(option, sizeof(variable), variable)) {
-            fprintf(out, "%sFile: [%s] %s. Environment: %s.\n", indent, option->section,
-                    option->key, variable);
+            snprintf(text, sizeof(text), "File: [%s] %s. Environment: %s.", option->section,
+                     option->key, variable);
+            print_wrapped(out, indent, indent, text);
             has_file = true;
         }
     }

@@ -131,8 +131,8 @@ const struct gn_program gn_cli_program = {
              "    gnomon-render --scene scene.json --env sunset.exr --camera camera.json \\\n"
              "        --quality reference --bounces 2 --out truth.exr --report report.json\n"
              "\n"
-             "Formats and axes: docs/frames.md. Exit status 0 only when all outputs are complete;\n"
-             "otherwise one line on stderr, and none of them is left.\n",
+             "Formats and axes: docs/frames.md. Exit status 0 only when all outputs are\n"
+             "complete; otherwise one line on stderr, and none of them is left.\n",
     .options = table,
     .n_options = sizeof(table) / sizeof(table[0]),
 };
