@@ -26,7 +26,8 @@ extern const struct gn_program gn_cli_program;
 struct gn_cli_request {
     struct gn_options *options; // owned
     const char *scene, *env, *camera, *out;
-    const char *env_params, *background, *report, *shadow_png, *composite_png; // may be NULL
+    // May be NULL:
+    const char *env_params, *background, *report, *light_map, *shadow_png, *composite_png;
     bool has_projection;
     enum gn_projection_type projection;
     bool has_world_from_env;

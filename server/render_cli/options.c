@@ -108,6 +108,10 @@ static const struct gn_option table[] = {
     {.key = "report",
      .value_name = "FILE",
      .help = "report.json: plan, times, rays, lights, error."},
+    {.key = "light-map",
+     .value_name = "FILE",
+     .help = "A PNG of the light to look at: the map, lat-long in world axes, and the lights made "
+             "of it."},
     {.key = "shadow-png", .value_name = "FILE", .help = "The shadow factor to look at."},
     {.key = "composite-png",
      .value_name = "FILE",
@@ -200,6 +204,7 @@ static void read_paths(struct gn_cli_request *request)
     request->background = get_path(request, "background");
     request->out = get_path(request, "out");
     request->report = get_path(request, "report");
+    request->light_map = get_path(request, "light-map");
     request->shadow_png = get_path(request, "shadow-png");
     request->composite_png = get_path(request, "composite-png");
 }

@@ -10,14 +10,15 @@
 #include "common/exr.h"
 #include "common/file.h"
 #include "common/png.h"
+#include "server/light/light_picture.h"
 #include "server/render_cli/cli.h"
 
-#define MAX_OUTPUTS 4
+#define MAX_OUTPUTS 5
 
 /** All paths that are written, the layers last. Returns their number. */
 static int list_outputs(const struct gn_cli_request *request, const char *out[MAX_OUTPUTS])
 {
-    const char *const all[MAX_OUTPUTS] = {request->report, request->shadow_png,
+    const char *const all[MAX_OUTPUTS] = {request->report, request->light_map, request->shadow_png,
                                           request->composite_png, request->out};
     int n = 0;
     for (int i = 0; i < MAX_OUTPUTS; i++) {
@@ -103,10 +104,11 @@ static struct gn_composite_layers get_composite_layers(const struct gn_layers *l
 }
 
 /** In codes where the background has codes, so that untouched pixels keep theirs. composite is
- * encoded in place otherwise, so it comes after the layers' copy is taken. */
-static int write_composite_png(const char *path, const struct gn_cli_result *result,
-                               const struct gn_image *composite, struct gn_pool *pool,
-                               struct gn_error *out_error)
+ * encoded in place otherwise, so it comes after the layers' copy is taken. is_literal: the factor
+ * scales the codes, as the 2007 paper has it. */
+static int write_composite_png(const char *path, bool is_literal,
+                               const struct gn_cli_result *result, const struct gn_image *composite,
+                               struct gn_pool *pool, struct gn_error *out_error)
 {
     const struct gn_image8 *codes = &result->background->codes8;
     const struct gn_response *response = &result->camera->response;
@@ -115,7 +117,7 @@ static int write_composite_png(const char *path, const struct gn_cli_result *res
         struct gn_image8 out = {0};
         int ret = gn_image8_init(&out, codes->width, codes->height, 3);
         if (ret == 0)
-            ret = gn_composite_image8(&layers, codes, response, false, pool, &out);
+            ret = gn_composite_image8(&layers, codes, response, is_literal, pool, &out);
         if (ret < 0)
             (void)gn_error_set(out_error, ret, "%s: cannot composite", path);
         else
@@ -132,6 +134,18 @@ static int write_composite_png(const char *path, const struct gn_cli_result *res
     gn_response_from_radiance(response, encoded.data, n);
     ret = write_png(path, encoded.data, encoded.width, encoded.height, out_error);
     gn_image_finish(&encoded);
+    return ret;
+}
+
+static int write_light_map(const char *path, const struct gn_lighting_state *light,
+                           struct gn_pool *pool, struct gn_error *out_error)
+{
+    struct gn_image8 picture = {0};
+    int ret = gn_light_picture_make(light, NULL, pool, &picture);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "%s: %s", path, strerror(-ret));
+    ret = gn_png_write_file(path, &picture, out_error);
+    gn_image8_finish(&picture);
     return ret;
 }
 
@@ -155,13 +169,19 @@ static int write_all(const struct gn_cli_request *request, const struct gn_cli_r
         ret = gn_cli_write_report(request, result, out_error);
         *n_written += ret == 0;
     }
+    if (ret == 0 && request->light_map) {
+        ret = write_light_map(request->light_map, result->light, pool, out_error);
+        *n_written += ret == 0;
+    }
     if (ret == 0 && request->shadow_png) {
         ret = write_png(request->shadow_png, layers->shadow.data, layers->width, layers->height,
                         out_error);
         *n_written += ret == 0;
     }
     if (ret == 0 && request->composite_png) {
-        ret = write_composite_png(request->composite_png, result, composite, pool, out_error);
+        ret =
+            write_composite_png(request->composite_png, request->render.quality == GN_QUALITY_SEED,
+                                result, composite, pool, out_error);
         *n_written += ret == 0;
     }
     if (ret == 0)
