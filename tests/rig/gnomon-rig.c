@@ -135,9 +135,11 @@ static const struct gn_program make_program = {
     .summary = "Writes a sequence into DIR: what a camera, a tracker and a light probe deliver of "
                "the demo room, and the same pictures with the teapot physically there. What is in "
                "DIR already, made with the same parameters, is kept.",
-    .notes = "DIR/sequence.json lists the frames (docs/frames.md); scene.json and camera.json are\n"
-             "what gnomond and gnomon-render read; exr/ has the pictures in floats with their\n"
-             "standard errors.\n",
+    .notes =
+        "DIR/sequence.json lists the frames in direct light (docs/frames.md), DIR/bounces the\n"
+        "same with bounces; scene.json and camera.json are what gnomond and gnomon-render\n"
+        "read; exr/ has the pictures in floats with their\n"
+        "standard errors.\n",
     .options = make_table,
     .n_options = GN_ARRAY_LEN(make_table),
     .min_arguments = 1,
@@ -186,10 +188,6 @@ static const struct gn_option sheet_table[] = {
      .type = GN_OPTION_STRING,
      .value_name = "DIR",
      .help = "Shadow factors by the same names: PNG, or EXR with the layer \"shadow\"."},
-    {.key = "bounces",
-     .type = GN_OPTION_BOOL,
-     .default_value = "false",
-     .help = "Shows the truth with bounces."},
     {.key = "rows",
      .type = GN_OPTION_INT,
      .min = 0,
@@ -200,12 +198,14 @@ static const struct gn_option sheet_table[] = {
 
 static const struct gn_program sheet_program = {
     .name = "gnomon-rig sheet",
-    .usage = "[OPTION]... DIR",
-    .summary = "Draws a contact sheet of the sequence in DIR, a row for each frame.",
+    .usage = "[OPTION]... DIR...",
+    .summary = "Draws a contact sheet of the sequence in DIR, a row for each frame. With several "
+               "DIRs, one below the other, --composites, --light and --shadow name folders that "
+               "hold a folder for each, by its name.",
     .options = sheet_table,
     .n_options = GN_ARRAY_LEN(sheet_table),
     .min_arguments = 1,
-    .max_arguments = 1,
+    .max_arguments = 16,
 };
 
 static int run_make(const struct gn_options *o, struct gn_error *error)
@@ -258,26 +258,81 @@ static int run_judge(const struct gn_options *o, struct gn_error *error)
     return result;
 }
 
-static int run_sheet(const struct gn_options *o, struct gn_error *error)
+/* ROOT/NAME where several sequences share the options, else ROOT; NULL stays NULL. */
+static const char *get_part(const char *root, const char *name, char *out, size_t size)
 {
+    if (!root || !name)
+        return root;
+    snprintf(out, size, "%s/%s", root, name);
+    return out;
+}
+
+static int draw_one(const struct gn_options *o, int index, struct gn_image8 *out,
+                    struct gn_error *error)
+{
+    const char *directory = gn_options_get_argument(o, index);
+    const char *slash = strrchr(directory, '/');
+    const char *name = slash ? slash + 1 : directory;
+    const char *part = gn_options_get_argument_count(o) > 1 ? name : NULL;
+    const char *title = gn_options_get_string(o, NULL, NULL, "title");
+    char heading[256], composites[4096], light[4096], shadow[4096];
+    snprintf(heading, sizeof(heading), "%s%s%s", title, part ? "  " : "", part ? name : "");
     const struct gn_rig_sheet_options options = {
-        .title = gn_options_get_string(o, NULL, NULL, "title"),
-        .composites = gn_options_get_string(o, NULL, NULL, "composites"),
-        .light = gn_options_get_string(o, NULL, NULL, "light"),
-        .shadow = gn_options_get_string(o, NULL, NULL, "shadow"),
-        .with_bounces = gn_options_get_bool(o, NULL, NULL, "bounces"),
+        .title = heading,
+        .composites = get_part(gn_options_get_string(o, NULL, NULL, "composites"), part, composites,
+                               sizeof(composites)),
+        .light =
+            get_part(gn_options_get_string(o, NULL, NULL, "light"), part, light, sizeof(light)),
+        .shadow =
+            get_part(gn_options_get_string(o, NULL, NULL, "shadow"), part, shadow, sizeof(shadow)),
         .n_rows = gn_options_get_int(o, NULL, NULL, "rows"),
     };
     struct gn_rig_sequence sequence;
-    struct gn_image8 sheet = {0};
-    int result = gn_rig_sequence_read(gn_options_get_argument(o, 0), &sequence, error);
+    int result = gn_rig_sequence_read(directory, &sequence, error);
     if (result)
         return result;
-    result = gn_rig_draw_sheet(&sequence, &options, &sheet, error);
+    result = gn_rig_draw_sheet(&sequence, &options, out, error);
+    gn_rig_sequence_finish(&sequence);
+    return result;
+}
+
+/* Puts `below` under *sheet, which is taken as it is where it is still empty. */
+static int stack(struct gn_image8 *sheet, struct gn_image8 *below, struct gn_error *error)
+{
+    if (!sheet->data) {
+        *sheet = *below;
+        memset(below, 0, sizeof(*below));
+        return 0;
+    }
+    struct gn_image8 both;
+    int width = sheet->width > below->width ? sheet->width : below->width;
+    int result = gn_image8_init(&both, width, sheet->height + below->height, 3);
+    if (result)
+        return gn_error_set(error, result, "no sheet of that height: show fewer rows");
+    const struct gn_image8 *parts[2] = {sheet, below};
+    for (int p = 0, y0 = 0; p < 2; y0 += parts[p++]->height)
+        for (int y = 0; y < parts[p]->height; y++)
+            memcpy(gn_image8_at(&both, 0, y0 + y), gn_image8_at(parts[p], 0, y),
+                   (size_t)parts[p]->width * 3);
+    gn_image8_finish(sheet);
+    *sheet = both;
+    return 0;
+}
+
+static int run_sheet(const struct gn_options *o, struct gn_error *error)
+{
+    struct gn_image8 sheet = {0};
+    int result = 0;
+    for (int i = 0; result == 0 && i < gn_options_get_argument_count(o); i++) {
+        struct gn_image8 one = {0};
+        result = draw_one(o, i, &one, error);
+        if (result == 0)
+            result = stack(&sheet, &one, error);
+        gn_image8_finish(&one);
+    }
     if (result == 0)
         result = gn_png_write_file(gn_options_get_string(o, NULL, NULL, "out"), &sheet, error);
     gn_image8_finish(&sheet);
-    gn_rig_sequence_finish(&sequence);
     return result;
 }
 
@@ -296,7 +351,7 @@ static const char usage[] =
     "\n"
     "  gnomon-rig make  [OPTION]... DIR             write a sequence and its truth\n"
     "  gnomon-rig judge [OPTION]... DIR COMPOSITES  error of composites against the truth\n"
-    "  gnomon-rig sheet [OPTION]... DIR             contact sheet\n"
+    "  gnomon-rig sheet [OPTION]... DIR...          contact sheet\n"
     "\n"
     "Each takes --help. To begin with:\n"
     "  gnomon-rig make --frames-per-light 3 lamps\n"

@@ -5,10 +5,7 @@
 
 #include "tests/rig/sequence.h"
 
-static const char *const light_names[2] = {"direct", "bounces"};
 static const char *const part_names[2] = {"object", "shadow"};
-static const char *const camera_keys[2] = {"picture", "picture_bounces"};
-static const char *const truth_keys[2] = {"truth", "truth_bounces"};
 
 static int get_difference(const uint8_t *a, const uint8_t *b, int *out_largest)
 {
@@ -57,21 +54,18 @@ static int judge_frame(const struct gn_rig_sequence *sequence, const char *compo
     int result = gn_rig_read_picture(composites, name, &composite, error);
     if (result == 0)
         result = read_member(sequence, index, "object", &object, error);
-    for (int light = 0; result == 0 && light < 2; light++) {
-        gn_image8_finish(&camera);
-        gn_image8_finish(&truth);
-        result = read_member(sequence, index, camera_keys[light], &camera, error);
-        if (result == 0)
-            result = read_member(sequence, index, truth_keys[light], &truth, error);
-        if (result == 0 && (composite.width != camera.width || composite.height != camera.height ||
-                            truth.width != camera.width || truth.height != camera.height ||
-                            object.width != camera.width || object.height != camera.height))
-            result = gn_error_set(error, -EINVAL, "%s/%s: %d x %d px, its camera frame has %d x %d",
-                                  composites, name, composite.width, composite.height, camera.width,
-                                  camera.height);
-        if (result == 0)
-            add_pixels(&camera, &truth, &object, &composite, io_sums->errors[light]);
-    }
+    if (result == 0)
+        result = read_member(sequence, index, "picture", &camera, error);
+    if (result == 0)
+        result = read_member(sequence, index, "truth", &truth, error);
+    if (result == 0 && (composite.width != camera.width || composite.height != camera.height ||
+                        truth.width != camera.width || truth.height != camera.height ||
+                        object.width != camera.width || object.height != camera.height))
+        result = gn_error_set(error, -EINVAL, "%s/%s: %d x %d px, its camera frame has %d x %d",
+                              composites, name, composite.width, composite.height, camera.width,
+                              camera.height);
+    if (result == 0)
+        add_pixels(&camera, &truth, &object, &composite, io_sums->errors);
     gn_image8_finish(&composite);
     gn_image8_finish(&object);
     gn_image8_finish(&camera);
@@ -81,9 +75,9 @@ static int judge_frame(const struct gn_rig_sequence *sequence, const char *compo
 
 static void add_sums(const struct gn_rig_verdict *sums, struct gn_rig_verdict *io_total)
 {
-    for (int i = 0; i < 4; i++) {
-        const struct gn_rig_errors *e = &sums->errors[i / 2][i % 2];
-        struct gn_rig_errors *t = &io_total->errors[i / 2][i % 2];
+    for (int i = 0; i < 2; i++) {
+        const struct gn_rig_errors *e = &sums->errors[i];
+        struct gn_rig_errors *t = &io_total->errors[i];
         t->pixels += e->pixels;
         t->composite += e->composite;
         t->untouched += e->untouched;
@@ -93,17 +87,12 @@ static void add_sums(const struct gn_rig_verdict *sums, struct gn_rig_verdict *i
 static json_t *describe(const struct gn_rig_verdict *sums)
 {
     json_t *out = json_object();
-    for (int light = 0; light < 2; light++) {
-        json_t *parts = json_object();
-        for (int part = 0; part < 2; part++) {
-            const struct gn_rig_errors *e = &sums->errors[light][part];
-            double n = e->pixels ? (double)e->pixels : 1;
-            json_object_set_new(parts, part_names[part],
-                                json_pack("{s:I,s:f,s:f}", "pixels", (json_int_t)e->pixels,
-                                          "composite", e->composite / n, "untouched",
-                                          e->untouched / n));
-        }
-        json_object_set_new(out, light_names[light], parts);
+    for (int part = 0; part < 2; part++) {
+        const struct gn_rig_errors *e = &sums->errors[part];
+        double n = e->pixels ? (double)e->pixels : 1;
+        json_object_set_new(out, part_names[part],
+                            json_pack("{s:I,s:f,s:f}", "pixels", (json_int_t)e->pixels, "composite",
+                                      e->composite / n, "untouched", e->untouched / n));
     }
     return out;
 }
@@ -112,8 +101,8 @@ static void print_row(FILE *table, const char *name, const char *label,
                       const struct gn_rig_verdict *sums)
 {
     fprintf(table, "%-10s %-10s", name, label);
-    for (int i = 0; i < 4; i++) {
-        const struct gn_rig_errors *e = &sums->errors[i / 2][i % 2];
+    for (int i = 0; i < 2; i++) {
+        const struct gn_rig_errors *e = &sums->errors[i];
         double n = e->pixels ? (double)e->pixels : 1;
         fprintf(table, "  %6.2f (%5.1f)", e->composite / n, e->untouched / n);
     }
@@ -130,8 +119,8 @@ int gn_rig_judge(const struct gn_rig_sequence *sequence, const char *composites,
     if (table)
         fprintf(table,
                 "error /255 of the composites (of untouched camera frames)\n%-10s %-10s"
-                "  %-14s  %-14s  %-14s  %-14s\n",
-                "frame", "light", "object", "shadow", "object bounced", "shadow bounced");
+                "  %-14s  %-14s\n",
+                "frame", "light", "object", "shadow");
     for (int i = 0; i < (int)json_array_size(sequence->frames); i++) {
         struct gn_rig_verdict sums = {0};
         const char *label = gn_rig_sequence_get_text(sequence, i, "label");

@@ -20,7 +20,8 @@
 
 #define GN_RIG_MAX_FRAMES 1000
 
-/** What to make. Strings are borrowed. */
+/** What to make: DIRECTORY holds the sequence in direct light, DIRECTORY/bounces the same with
+ * bounces, on the same files. Strings are borrowed. */
 struct gn_rig_sequence_options {
     const char *directory;
     const char *light;       // "lamps", or a lat-long EXR or Radiance file
@@ -79,9 +80,9 @@ struct gn_rig_errors {
     double untouched; // |camera frame - truth|
 };
 
-/** One frame, or all: [0 direct, 1 bounces][0 object, 1 shadow]. */
+/** One frame, or all: [0 object, 1 shadow]. */
 struct gn_rig_verdict {
-    struct gn_rig_errors errors[2][2];
+    struct gn_rig_errors errors[2];
 };
 
 /**
@@ -99,7 +100,6 @@ struct gn_rig_sheet_options {
     const char *composites; // folder of NAME.png
     const char *light;      // folder of NAME.png: light maps with their lights
     const char *shadow;     // folder of NAME.png or NAME.exr (channels shadow.R, G, B)
-    bool with_bounces;      // truth with bounces in place of direct light
     int n_rows;             // frames shown, spread evenly; 0: all
 };
 

@@ -403,13 +403,11 @@ static json_t *describe_frame(const struct maker *m, int frame, const struct gn_
     jitter_pose(m, frame, view->world_from_camera, delivered);
     json_object_set_new(f, "time_s", json_real(frame / 25.0));
     add_text(f, "picture", "camera/%04d.png", frame);
-    add_text(f, "picture_bounces", "camera_bounces/%04d.png", frame);
     add_text(f, "environment", "env/%s-%d.%s", probe_names[m->o->probe], light,
              m->o->is_float ? "exr" : "png");
     json_object_set_new(f, "world_from_camera", list_numbers(delivered, 16));
     json_object_set_new(f, "world_from_camera_true", list_numbers(view->world_from_camera, 16));
     add_text(f, "truth", "truth/%04d.png", frame);
-    add_text(f, "truth_bounces", "truth_bounces/%04d.png", frame);
     add_text(f, "truth_exr", "exr/%04d.exr", frame);
     add_text(f, "object", "object/%04d.png", frame);
     if (m->n_lights > 1)
@@ -473,6 +471,29 @@ static int write_json(const struct maker *m, const char *name, const json_t *val
     return result;
 }
 
+/* DIR/bounces/sequence.json: the same files, but pictures and truth with bounces. */
+static int write_bounces(const struct maker *m, const json_t *direct, struct gn_error *error)
+{
+    static const char *const shared[] = {"environment", "truth_exr", "object"};
+    json_t *s = json_deep_copy(direct), *f;
+    char text[PATH_MAX_BYTES];
+    size_t i;
+    make_path(m, text, "bounces");
+    if (mkdir(text, 0777) && errno != EEXIST)
+        return gn_error_set(error, -errno, "%s: %s", text, strerror(errno));
+    json_object_set_new(s, "scene", json_string("../scene.json"));
+    json_array_foreach(json_object_get(s, "frames"), i, f)
+    {
+        for (size_t k = 0; k < GN_ARRAY_LEN(shared); k++)
+            add_text(f, shared[k], "../%s", json_string_value(json_object_get(f, shared[k])));
+        add_text(f, "picture", "../camera_bounces/%04zu.png", i);
+        add_text(f, "truth", "../truth_bounces/%04zu.png", i);
+    }
+    int result = write_json(m, "bounces/sequence.json", s, error);
+    json_decref(s);
+    return result;
+}
+
 static int write_description(const struct maker *m, struct gn_error *error)
 {
     struct gn_rig_view view;
@@ -499,6 +520,8 @@ static int write_description(const struct maker *m, struct gn_error *error)
     json_object_set(s, "frames", m->frames);
     if (result == 0)
         result = write_json(m, "probe.json", probe, error);
+    if (result == 0)
+        result = write_bounces(m, s, error);
     if (result == 0)
         result = write_json(m, "sequence.json", s, error);
     json_decref(s);

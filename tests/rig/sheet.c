@@ -130,8 +130,7 @@ static int get_picture(const struct sheet *s, enum column column, int index, str
 {
     const char *directory = s->sequence->directory,
                *name = gn_rig_sequence_get_name(s->sequence, index);
-    const char *truth = gn_rig_sequence_get_text(s->sequence, index,
-                                                 s->o->with_bounces ? "truth_bounces" : "truth");
+    const char *truth = gn_rig_sequence_get_text(s->sequence, index, "truth");
     struct gn_image8 a = {0}, b = {0};
     int result = 0;
     if (!truth)
