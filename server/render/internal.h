@@ -22,6 +22,10 @@
 #define LANES GN_RT_PACKET
 /** Boxes that real geometry is put in for conservative tests. */
 #define MAX_BLOCKERS 64
+/** Clusters of a set's triangles. */
+#define MAX_CLUSTERS 64
+/** Directions of a group: 16 blocks of 16. */
+#define GROUP (LANES * LANES)
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
 
@@ -53,18 +57,55 @@ struct sample {
     double base[3], lost[3], gain[3];
 };
 
-/** Directions that carry light, in structure-of-arrays form. */
+/** A box for conservative tests, m; or of directions. */
+struct box {
+    float min[3], max[3];
+};
+
+/** Boxes of 16 sets of unit directions, widened against rounding; an empty set's has no direction
+ * in it, only 0. The inverses are of the numbers above, kept off zero. */
+struct direction_boxes {
+    _Alignas(64) float min[3][LANES];
+    _Alignas(64) float max[3][LANES];
+    _Alignas(64) float inverse_min[3][LANES];
+    _Alignas(64) float inverse_max[3][LANES];
+};
+
+/** 16 blocks of 16 lights each, all near each other. */
+struct light_group {
+    struct direction_boxes blocks;
+    uint16_t lit[LANES];              // per block, bit i: lane i has light
+    double block_moment[LANES][3][3]; // per block and channel: sum of irradiance times direction
+    double moment[3][3];              // of the group
+};
+
+/** Directions that carry light, in structure-of-arrays form; the reference's in groups, filled up
+ * with dark ones. */
 struct light_list {
     int n, capacity;
+    int n_lit;            // without the dark ones
     float *dir[3];        // unit, world
     float *irradiance[3]; // at normal incidence, W/m^2
     double total[3];      // sum of irradiance
     double *cdf;          // [n] of luminance, rising to 1; the reference's choice of lights
+    int n_groups;         // reference only: n / GROUP
+    struct light_group *groups;
+    struct direction_boxes *group_boxes; // of the groups, 16 together
 };
 
-/** A box for conservative tests, m. */
-struct box {
-    float min[3], max[3];
+/** Some triangles that are near each other. */
+struct cluster {
+    struct box box; // exact
+    int first_vertex, n_vertices;
+};
+
+/** A set's triangles, each in one cluster. */
+struct clusters {
+    enum gn_rt_set role;
+    int n;
+    struct cluster cluster[MAX_CLUSTERS];
+    int n_vertices;
+    float *vertices[3]; // world; of clusters of many triangles their box's corners, owned
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -104,8 +145,11 @@ struct scratch {
     int lane_light[GN_RT_PACKET];
     float lane_weight[GN_RT_PACKET];
     int n_lanes;
-    uint64_t *texel_blocked; // [texel words], reference
-    int n_texel_words;
+    // Reference: per block of lights, bit i: virtual (real; where a virtual object is lit: all)
+    // objects hide light i from the sample at hand.
+    uint16_t *cut_texels, *hidden_texels; // [n_texel_blocks]
+    int n_texel_blocks;
+    struct box near[2 * MAX_CLUSTERS]; // of clusters above the sample's horizon, seen from it
 };
 
 /** What one tile adds to the report; summed in the order of tiles. */
@@ -134,6 +178,8 @@ struct frame {
     const struct box *blockers;       // [n_blockers] real objects, exact
     const struct box *wide_blockers;  // the same, widened against rounding
     int n_blockers;
+    const struct clusters *clusters; // [2]: real, virtual
+    float margin;                    // m, by which boxes are widened
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
     double floor_irradiance[3];      // sums up to this are no light (1e-6 of all)
     float floor_radiance;            // radiances below this do not make contrast
@@ -205,11 +251,38 @@ void gn_shadow_clear(struct sample *sample);
 /** Boxes of the real objects, each in one. Returns their number. */
 int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static MAX_BLOCKERS]);
 
-/* reference.c */
+/* clusters.c */
+
+/** Makes the clusters of the scene's objects of a role. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role,
+                                 struct clusters *out);
+void gn_clusters_finish(struct clusters *clusters);
+/** The boxes, widened by margin and relative to org, of clusters that are not wholly in or under
+ * the plane through org: no ray that leaves upwards meets the others. Returns their number, at most
+ * MAX_CLUSTERS. */
+int gn_clusters_list_above(const struct clusters *clusters, const float org[static 3],
+                           const float normal[static 3], float margin, struct box *out_boxes);
+
+/* directions.c */
+
+/** Makes the groups of a list whose lights are in their order. */
+void gn_directions_fill_groups(struct light_list *list);
+/** Sets one of 16; box may be empty (min > max). */
+void gn_directions_set_box(struct direction_boxes *boxes, int lane, const struct box *box);
+/** Bit i: unless all rays from the origin with a direction of box i surely miss `box`. */
+unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct box *box);
+/** Bit i: box i may hold a direction above the plane across n; surely holds no other. */
+void gn_directions_split(const struct direction_boxes *boxes, const float n[static 3],
+                         unsigned *out_some, unsigned *out_all);
+
+/* reference_lights.c */
 
 /** Fills list from the whole map: every texel, bright ones in parts, and what it does not show. */
 GN_MUST_USE int gn_reference_make_lights(const struct gn_radiance_map *map,
                                          struct light_list *list);
+
+/* reference.c */
+
 /** As gn_shade_samples and gn_shadow_samples, by every direction of the map, with bounces. */
 void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                         struct tile_figures *figures);
@@ -239,10 +312,12 @@ void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sam
 
 /* light_list.c */
 
-GN_MUST_USE int gn_render_lights_reserve(struct light_list *list, int capacity);
+GN_MUST_USE int gn_render_lights_reserve(struct light_list *list, int64_t capacity);
 void gn_render_lights_finish(struct light_list *list);
 void gn_render_lights_add(struct light_list *list, const double dir[static 3],
                           const double irradiance[static 3]);
+/** Adds dark lights up to the next multiple. */
+void gn_render_lights_pad(struct light_list *list, int multiple);
 /** Fills list from the state's lights; dark ones are left out. */
 GN_MUST_USE int gn_render_lights_from_state(const struct gn_lighting_state *state,
                                             struct light_list *list);

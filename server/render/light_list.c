@@ -6,27 +6,30 @@
 #include <stdlib.h>
 #include <string.h>
 
-int gn_render_lights_reserve(struct light_list *list, int capacity)
+int gn_render_lights_reserve(struct light_list *list, int64_t capacity)
 {
-    list->n = 0;
+    list->n = list->n_lit = list->n_groups = 0;
     memset(list->total, 0, sizeof(list->total));
     if (capacity <= list->capacity)
         return 0;
     gn_render_lights_finish(list);
-    size_t size = (size_t)capacity;
-    float *block = malloc(6 * size * sizeof(*block));
-    double *cdf = malloc(size * sizeof(*cdf));
-    if (!block || !cdf) {
-        free(block);
-        free(cdf);
+    size_t size = ((size_t)capacity + GROUP - 1) / GROUP * GROUP;
+    size_t n_groups = size / GROUP;
+    float *block = aligned_alloc(64, 6 * size * sizeof(*block));
+    list->cdf = malloc(size * sizeof(*list->cdf));
+    list->groups = aligned_alloc(64, n_groups * sizeof(*list->groups));
+    list->group_boxes =
+        aligned_alloc(64, (n_groups + LANES - 1) / LANES * sizeof(*list->group_boxes));
+    list->dir[0] = block;
+    if (!block || !list->cdf || !list->groups || !list->group_boxes) {
+        gn_render_lights_finish(list);
         return -ENOMEM;
     }
     for (size_t k = 0; k < 3; k++) {
         list->dir[k] = block + k * size;
         list->irradiance[k] = block + (3 + k) * size;
     }
-    list->cdf = cdf;
-    list->capacity = capacity;
+    list->capacity = (int)size;
     return 0;
 }
 
@@ -34,6 +37,8 @@ void gn_render_lights_finish(struct light_list *list)
 {
     free(list->dir[0]); // one block for all six
     free(list->cdf);
+    free(list->groups);
+    free(list->group_boxes);
     memset(list, 0, sizeof(*list));
 }
 
@@ -48,6 +53,17 @@ void gn_render_lights_add(struct light_list *list, const double dir[static 3],
         list->total[k] += (float)irradiance[k];
     }
     list->n++;
+    list->n_lit++;
+}
+
+void gn_render_lights_pad(struct light_list *list, int multiple)
+{
+    for (; list->n % multiple != 0; list->n++) {
+        for (int k = 0; k < 3; k++) {
+            list->dir[k][list->n] = k == 2;
+            list->irradiance[k][list->n] = 0;
+        }
+    }
 }
 
 int gn_render_lights_from_state(const struct gn_lighting_state *state, struct light_list *list)

@@ -54,7 +54,9 @@ static bool can_any_light_cast(const struct frame *frame)
     const struct light_list *lights = frame->lights;
     for (int l = 0; l < lights->n; l++) {
         const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-        if (gn_box_may_meet_from_box(&frame->virtual_box, &frame->real_box, dir))
+        bool is_dark = !(lights->irradiance[0][l] > 0 || lights->irradiance[1][l] > 0 ||
+                         lights->irradiance[2][l] > 0);
+        if (!is_dark && gn_box_may_meet_from_box(&frame->virtual_box, &frame->real_box, dir))
             return true;
     }
     return false;

@@ -1,217 +1,248 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * The judge: every direction of the radiance map, exact visibility, no light extraction, no tiles
- * of lights. Slow on purpose; the only ray left out is one that misses the virtual objects' box.
+ * The judge: every direction of the radiance map, exact visibility, no light extraction. For each
+ * sample by itself: which directions above its horizon are hidden, then the sums.
  *
- * The map is taken as constant over each texel, as it was measured. A texel is one direction, its
- * centre, of irradiance L dOmega. One that holds much of all energy is a lamp, and one direction
- * would give it a hard shadow: it is cut into parts that share its irradiance evenly. What the map
- * does not show has the fill's radiance, on rings of equal solid angle that begin at its rim.
+ * Left out, and no bit of the result with them, are rays that surely meet nothing. Of a set's
+ * clusters of triangles only those matter that are not wholly under the receiver's tangent plane;
+ * a group of directions, then each of its blocks, is traced only where the box of its directions
+ * may meet the box of such a cluster. A block is a packet.
+ * The sum over a block or a group that is wholly open and above the horizon, sum Phi_i (n . d_i),
+ * is n . (sum Phi_i d_i), which is known.
  */
 #include "server/render/internal.h"
 
 #include <math.h>
 #include <string.h>
 
-// A texel with more than this share of the map's luminous energy is cut into n x n parts.
-#define SHARE_4X4 1e-2
-#define SHARE_2X2 1e-3
-// So many texels at most can pass the shares: 1 / SHARE_4X4 and 1 / SHARE_2X2.
-#define MAX_PARTS (100 * 16 + 1000 * 4)
-
-#define FILL_RINGS 96 // of the part beyond the rim, and of the part inside it
-#define FILL_SECTORS 192
-
-static double get_luminance(const double rgb[static 3])
+/** Cosines of a block's lights; returns the mask of lit ones above the surface's horizon. */
+static unsigned get_cosines(const struct light_list *lights, const struct sample *s, int block,
+                            float out[static LANES])
 {
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
-static void get_texel_irradiance(const struct gn_radiance_map *map, size_t i, double out[static 3])
-{
-    for (size_t k = 0; k < 3; k++)
-        out[k] = (double)map->radiance.data[3 * i + k] * map->solid_angle[i];
-}
-
-static void add_texel(const struct gn_radiance_map *map, int x, int y, double total,
-                      struct light_list *list)
-{
-    size_t i = (size_t)y * (size_t)map->radiance.width + (size_t)x;
-    double irradiance[3];
-    get_texel_irradiance(map, i, irradiance);
-    double share = total > 0 ? get_luminance(irradiance) / total : 0;
-    int n = share > SHARE_4X4 ? 4 : share > SHARE_2X2 ? 2 : 1;
-    double dirs[16][3];
-    int n_shown = 0;
-    for (int part = 0; part < n * n && n > 1; part++) {
-        double px = x + (part % n + 0.5) / n;
-        double py = y + ((part / n) + 0.5) / n; // NOLINT(bugprone-integer-division): the row
-        double dir[3];
-        if (gn_projection_get_direction(&map->projection, px, py, dir))
-            gn_pose_rotate(&map->world_from_probe, dir, dirs[n_shown++]);
+    const float *x = lights->dir[0] + block * LANES;
+    const float *y = lights->dir[1] + block * LANES;
+    const float *z = lights->dir[2] + block * LANES;
+    const float *n = s->surface.normal_shading;
+    const float *g = s->surface.normal_geometric;
+    unsigned mask = 0;
+    for (int i = 0; i < LANES; i++) {
+        float c = n[0] * x[i] + n[1] * y[i] + n[2] * z[i];
+        float d = g[0] * x[i] + g[1] * y[i] + g[2] * z[i];
+        out[i] = d > 0 ? c : 0;
     }
-    if (n_shown == 0) {
-        for (size_t k = 0; k < 3; k++)
-            dirs[0][k] = map->direction_world[3 * i + k];
-        n_shown = 1;
-    }
-    for (int k = 0; k < 3; k++)
-        irradiance[k] /= n_shown;
-    for (int part = 0; part < n_shown; part++)
-        gn_render_lights_add(list, dirs[part], irradiance);
+    for (int i = 0; i < LANES; i++)
+        mask |= (unsigned)(out[i] > 0) << i;
+    return mask & lights->groups[block / LANES].lit[block % LANES];
 }
 
-/** Cells of the sphere that the map does not show; theta from the optical axis. */
-static void add_fill(const struct gn_radiance_map *map, struct light_list *list)
+/** Which of 16 boxes hold directions above the surface's horizon, and which hold no others. */
+static void split_by_horizon(const struct direction_boxes *boxes, const struct sample *s,
+                             unsigned *out_some, unsigned *out_all)
 {
-    double rim = cos(map->projection.theta_max);
-    double cell[2] = {2 * M_PI * (1 - rim) / (FILL_RINGS * FILL_SECTORS),
-                      2 * M_PI * (1 + rim) / (FILL_RINGS * FILL_SECTORS)};
-    // Two rounds: the cells' solid angles add up to the map's own figure of what is not shown.
-    double scale = 0;
-    for (int round = 0; round < 2; round++) {
-        double sum = 0;
-        for (int i = 0; i < 2 * FILL_RINGS * FILL_SECTORS; i++) {
-            int part = i / (FILL_RINGS * FILL_SECTORS);
-            double ring = (i / FILL_SECTORS) % FILL_RINGS + 0.5;
-            double phi = 2 * M_PI * (i % FILL_SECTORS + 0.5) / FILL_SECTORS;
-            double z =
-                part == 0 ? 1 - (1 - rim) * ring / FILL_RINGS : rim - (1 + rim) * ring / FILL_RINGS;
-            double r = sqrt(fmax(0, 1 - z * z));
-            double dir[3] = {r * cos(phi), r * sin(phi), z};
-            double xy[2];
-            if (gn_projection_get_position(&map->projection, dir, xy))
-                continue;
-            sum += cell[part];
-            if (round == 0)
-                continue;
-            double irradiance[3];
-            for (int k = 0; k < 3; k++)
-                irradiance[k] = map->fill[k] * cell[part] * scale;
-            gn_pose_rotate(&map->world_from_probe, dir, dir);
-            gn_render_lights_add(list, dir, irradiance);
-        }
-        scale = sum > 0 ? map->fill_solid_angle / sum : 0;
+    unsigned some;
+    unsigned all;
+    gn_directions_split(boxes, s->surface.normal_geometric, out_some, out_all);
+    gn_directions_split(boxes, s->surface.normal_shading, &some, &all);
+    *out_some &= some;
+    *out_all &= all;
+}
+
+/** Every ray of the sample starts at one point. */
+static void aim_packet(struct gn_rt_packet *packet, const struct sample *s)
+{
+    for (int i = 0; i < LANES; i++) {
+        packet->org_x[i] = s->org[0];
+        packet->org_y[i] = s->org[1];
+        packet->org_z[i] = s->org[2];
+        packet->t_near[i] = 0;
+        packet->t_far[i] = INFINITY;
     }
 }
 
-/** The running sum of luminance, from 0 to 1. */
-static void fill_cdf(struct light_list *list)
-{
-    double sum = 0;
-    for (int i = 0; i < list->n; i++) {
-        const double e[3] = {list->irradiance[0][i], list->irradiance[1][i],
-                             list->irradiance[2][i]};
-        sum += get_luminance(e);
-        list->cdf[i] = sum;
-    }
-    for (int i = 0; i < list->n && sum > 0; i++)
-        list->cdf[i] /= sum;
-}
-
-int gn_reference_make_lights(const struct gn_radiance_map *map, struct light_list *list)
-{
-    int width = map->radiance.width;
-    int height = map->radiance.height;
-    bool has_fill =
-        !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
-    int ret = gn_render_lights_reserve(list, width * height + MAX_PARTS +
-                                                 (has_fill ? 2 * FILL_RINGS * FILL_SECTORS : 0));
-    if (ret < 0)
-        return ret;
-    double total[3] = {0};
-    for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
-        double irradiance[3];
-        get_texel_irradiance(map, i, irradiance);
-        for (int k = 0; k < 3; k++)
-            total[k] += irradiance[k];
-    }
-    double luminance = get_luminance(total);
-    for (int y = 0; y < height; y++) {
-        for (int x = 0; x < width; x++)
-            add_texel(map, x, y, luminance, list);
-    }
-    if (has_fill)
-        add_fill(map, list);
-    fill_cdf(list);
-    return 0;
-}
-
-/** A loop over all lights of one sample: adds what reaches it through `set` to sums[0], and of that
- * what `blocked` (may be NULL) marks to sums[1]. */
-static void integrate(const struct frame *frame, struct scratch *scratch, const struct sample *s,
-                      enum gn_rt_set set, const uint64_t *blocked, double sums[static 2][3],
-                      uint64_t *rays)
+static unsigned trace_block(const struct frame *frame, struct scratch *scratch,
+                            const struct sample *s, enum gn_rt_set set, int block, uint64_t *rays)
 {
     const struct light_list *lights = frame->lights;
-    for (int l = 0; l <= lights->n; l++) {
-        bool is_full = l == lights->n;
-        if (!is_full) {
-            const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-            float c = surface_cosine(&s->surface, dir);
-            if (!(c > 0))
+    struct gn_rt_packet *packet = &scratch->packet;
+    float cosines[LANES];
+    unsigned mask = get_cosines(lights, s, block, cosines);
+    if (mask == 0)
+        return 0;
+    size_t first = (size_t)block * LANES;
+    memcpy(packet->dir_x, lights->dir[0] + first, sizeof(packet->dir_x));
+    memcpy(packet->dir_y, lights->dir[1] + first, sizeof(packet->dir_y));
+    memcpy(packet->dir_z, lights->dir[2] + first, sizeof(packet->dir_z));
+    for (int i = 0; i < LANES; i++) {
+        packet->valid[i] = mask >> i & 1 ? -1 : 0;
+        *rays += mask >> i & 1;
+    }
+    return gn_rt_get_occluded16(frame->rt, set, packet);
+}
+
+/** Of 16 boxes of directions, those that may meet one of the listed boxes; and for each lane, which
+ * it may meet. */
+static unsigned find_near(const struct direction_boxes *directions, const struct box *boxes,
+                          const uint8_t *list, int n_list, unsigned asked,
+                          uint16_t out_lanes[static 2 * MAX_CLUSTERS])
+{
+    unsigned any = 0;
+    for (int i = 0; i < n_list; i++) {
+        unsigned lanes = gn_directions_meet(directions, &boxes[list[i]]) & asked;
+        out_lanes[i] = (uint16_t)lanes;
+        any |= lanes;
+    }
+    return any;
+}
+
+/** The group's blocks that are above the horizon and may meet something. */
+static unsigned choose_blocks(const struct frame *frame, const struct scratch *scratch,
+                              const struct sample *s, const struct light_group *group,
+                              const uint8_t *list, int n_list)
+{
+    unsigned some;
+    unsigned all;
+    uint16_t lanes[2 * MAX_CLUSTERS];
+    split_by_horizon(&group->blocks, s, &some, &all);
+    if (!frame->cull || some == 0)
+        return some;
+    return find_near(&group->blocks, scratch->near, list, n_list, some, lanes);
+}
+
+/** Marks in masks[block] the directions that the set hides. True where there is one. */
+static bool find_hidden(const struct frame *frame, struct scratch *scratch, const struct sample *s,
+                        enum gn_rt_set set, uint16_t *masks, uint64_t *rays)
+{
+    const struct light_list *lights = frame->lights;
+    uint8_t everything[2 * MAX_CLUSTERS];
+    unsigned found = 0;
+    int n_near = 0;
+    memset(masks, 0, (size_t)lights->n / LANES * sizeof(*masks));
+    for (int i = 0; i < 2 && frame->cull; i++) {
+        if (set & frame->clusters[i].role)
+            n_near +=
+                gn_clusters_list_above(&frame->clusters[i], s->org, s->surface.normal_geometric,
+                                       frame->margin, scratch->near + n_near);
+    }
+    if (frame->cull && n_near == 0)
+        return false;
+    for (int i = 0; i < n_near; i++)
+        everything[i] = (uint8_t)i;
+    aim_packet(&scratch->packet, s);
+    for (int first = 0; first < lights->n_groups; first += LANES) {
+        const struct direction_boxes *boxes = &lights->group_boxes[first / LANES];
+        uint16_t lanes[2 * MAX_CLUSTERS];
+        unsigned groups;
+        unsigned all;
+        split_by_horizon(boxes, s, &groups, &all);
+        if (frame->cull && groups)
+            groups = find_near(boxes, scratch->near, everything, n_near, groups, lanes);
+        for (int i = 0; groups >> i; i++) {
+            uint8_t list[2 * MAX_CLUSTERS];
+            int n_list = 0;
+            if (!(groups >> i & 1))
                 continue;
-            if (blocked && frame->options.shadow_unweighted)
-                c = 1;
-            is_full = gn_packet_add(scratch, s->org, dir, 0, l, c);
-        }
-        if (!is_full)
-            continue;
-        int n = scratch->n_lanes;
-        uint32_t hidden = 0;
-        if (blocked && !frame->run_blockers)
-            scratch->n_lanes = 0;
-        else
-            hidden = gn_packet_trace(frame, scratch, set, &n, rays);
-        for (int lane = 0; lane < n; lane++) {
-            int light = scratch->lane_light[lane];
-            if (hidden >> lane & 1)
-                continue;
-            bool is_cut = blocked && (blocked[light / 64] >> (light % 64) & 1);
-            for (int k = 0; k < 3; k++) {
-                double e = (double)scratch->lane_weight[lane] * lights->irradiance[k][light];
-                sums[0][k] += e;
-                if (is_cut)
-                    sums[1][k] += e;
+            for (int j = 0; j < n_near; j++) {
+                list[n_list] = (uint8_t)j;
+                n_list += lanes[j] >> i & 1;
+            }
+            unsigned blocks =
+                choose_blocks(frame, scratch, s, &lights->groups[first + i], list, n_list);
+            for (int b = 0; blocks >> b; b++) {
+                int block = (first + i) * LANES + b;
+                if (blocks >> b & 1)
+                    masks[block] = (uint16_t)trace_block(frame, scratch, s, set, block, rays);
+                found |= masks[block];
             }
         }
     }
+    return found != 0;
 }
 
-/** Marks in scratch->texel_blocked the lights that virtual objects hide. */
-static void find_blocked(const struct frame *frame, struct scratch *scratch, struct sample *s,
-                         struct tile_figures *figures)
+static void add_moment(const double moment[static 3][3], const float n[static 3],
+                       double sum[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        sum[k] += moment[k][0] * n[0] + moment[k][1] * n[1] + moment[k][2] * n[2];
+}
+
+static void add_lights(const struct light_list *lights, int block, unsigned mask,
+                       const float weights[static LANES], double sum[static 3])
+{
+    for (int i = 0; mask >> i; i++) {
+        if (!(mask >> i & 1))
+            continue;
+        for (int k = 0; k < 3; k++)
+            sum[k] += (double)weights[i] * lights->irradiance[k][block * LANES + i];
+    }
+}
+
+static bool is_any_set(const uint16_t masks[static LANES])
+{
+    unsigned any = 0;
+    for (int i = 0; i < LANES; i++)
+        any |= masks[i];
+    return any != 0;
+}
+
+/** What the lights that hidden does not mark send: to sums[0], and of that what cut marks to
+ * sums[1]. With `even` every light above the horizon has weight 1. */
+static void sum_group(const struct frame *frame, const struct sample *s, int g, bool is_above,
+                      const struct scratch *scratch, bool even, double sums[static 2][3])
 {
     const struct light_list *lights = frame->lights;
-    memset(scratch->texel_blocked, 0, (size_t)scratch->n_texel_words * sizeof(uint64_t));
-    for (int l = 0; l <= lights->n; l++) {
-        bool is_full = l == lights->n;
-        if (!is_full) {
-            const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-            if (!(surface_cosine(&s->surface, dir) > 0))
-                continue;
-            if (frame->cull && !gn_box_may_meet(&frame->virtual_box, s->org, dir))
-                continue;
-            is_full = gn_packet_add(scratch, s->org, dir, 0, l, 0);
-        }
-        if (!is_full)
+    const struct light_group *group = &lights->groups[g];
+    const uint16_t *hidden = scratch->hidden_texels + g * LANES;
+    const uint16_t *cut = scratch->cut_texels + g * LANES;
+    unsigned some;
+    unsigned all;
+    if (is_above && !even && !is_any_set(hidden) && !is_any_set(cut)) {
+        add_moment(group->moment, s->surface.normal_shading, sums[0]);
+        return;
+    }
+    split_by_horizon(&group->blocks, s, &some, &all);
+    for (int b = 0; some >> b; b++) {
+        float weights[LANES];
+        bool is_open = (all >> b & 1) && !hidden[b] && !even;
+        if (!(some >> b & 1))
             continue;
-        int n;
-        uint32_t hidden = gn_packet_trace(frame, scratch, GN_RT_VIRTUAL, &n, &figures->rays_shadow);
-        for (int lane = 0; lane < n; lane++) {
-            if (!(hidden >> lane & 1))
-                continue;
-            int light = scratch->lane_light[lane];
-            scratch->texel_blocked[light / 64] |= UINT64_C(1) << (light % 64);
-            s->is_cut = true;
+        if (is_open)
+            add_moment(group->block_moment[b], s->surface.normal_shading, sums[0]);
+        if (is_open && !cut[b])
+            continue;
+        unsigned mask = get_cosines(lights, s, g * LANES + b, weights) & ~(unsigned)hidden[b];
+        for (int i = 0; i < LANES && even; i++)
+            weights[i] = 1;
+        if (!is_open)
+            add_lights(lights, g * LANES + b, mask, weights, sums[0]);
+        add_lights(lights, g * LANES + b, mask & cut[b], weights, sums[1]);
+    }
+}
+
+static void sum_lights(const struct frame *frame, const struct scratch *scratch,
+                       const struct sample *s, bool even, double sums[static 2][3])
+{
+    const struct light_list *lights = frame->lights;
+    for (int first = 0; first < lights->n_groups; first += LANES) {
+        unsigned some;
+        unsigned all;
+        split_by_horizon(&lights->group_boxes[first / LANES], s, &some, &all);
+        for (int i = 0; some >> i; i++) {
+            if (some >> i & 1)
+                sum_group(frame, s, first + i, all >> i & 1, scratch, even, sums);
         }
     }
+}
+
+static void clear_masks(const struct frame *frame, uint16_t *masks)
+{
+    memset(masks, 0, (size_t)frame->lights->n / LANES * sizeof(*masks));
 }
 
 void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                         struct tile_figures *figures)
 {
+    clear_masks(frame, scratch->cut_texels);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
@@ -219,7 +250,9 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
         double sums[2][3] = {{0}};
         double common[3] = {0};
         double touched[3] = {0};
-        integrate(frame, scratch, s, GN_RT_ALL, NULL, sums, &figures->rays_shade);
+        (void)find_hidden(frame, scratch, s, GN_RT_ALL, scratch->hidden_texels,
+                          &figures->rays_shade);
+        sum_lights(frame, scratch, s, false, sums);
         if (frame->run_bounces)
             gn_bounce_gather(frame, s, GN_RT_ALL, n_paths, common, touched, &figures->rays_shade);
         for (int k = 0; k < 3; k++) {
@@ -246,13 +279,17 @@ static void add_bounces(const struct frame *frame, struct sample *s, int n_paths
     }
 }
 
-/** U and S of a receiver whose hidden lights scratch->texel_blocked marks. */
+/** U and S of a receiver whose lights that virtual objects hide scratch->cut_texels marks. */
 static void sum_receiver(const struct frame *frame, struct scratch *scratch, struct sample *s,
                          int n_paths, struct tile_figures *figures)
 {
     double sums[2][3] = {{0}};
     uint64_t rays = 0;
-    integrate(frame, scratch, s, GN_RT_REAL, scratch->texel_blocked, sums, &rays);
+    if (frame->run_blockers)
+        (void)find_hidden(frame, scratch, s, GN_RT_REAL, scratch->hidden_texels, &rays);
+    else
+        clear_masks(frame, scratch->hidden_texels);
+    sum_lights(frame, scratch, s, frame->options.shadow_unweighted, sums);
     figures->rays_shadow += rays;
     figures->n_rays_real += rays;
     memcpy(s->open[0], sums[0], sizeof(sums[0]));
@@ -272,13 +309,14 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
         gn_shadow_clear(s);
         if (!s->is_receiver)
             continue;
-        find_blocked(frame, scratch, s, figures);
+        s->is_cut = find_hidden(frame, scratch, s, GN_RT_VIRTUAL, scratch->cut_texels,
+                                &figures->rays_shadow);
         if (s->is_cut || frame->run_bounces)
             sum_receiver(frame, scratch, s, n_paths, figures);
     }
     // The rest of a pixel that loses light somewhere: what it weighs in the pixel's ratio.
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
-    memset(scratch->texel_blocked, 0, (size_t)scratch->n_texel_words * sizeof(uint64_t));
+    clear_masks(frame, scratch->cut_texels);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (!groups[s->group] || s->is_summed || s->kind == SAMPLE_VIRTUAL)

@@ -32,6 +32,7 @@ struct gn_renderer {
     double slopes[4];
     struct box blockers[MAX_BLOCKERS], wide_blockers[MAX_BLOCKERS]; // [n_blockers]
     int n_blockers;
+    struct clusters clusters[2]; // real, virtual
 };
 
 int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
@@ -54,6 +55,13 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
     }
     memset(renderer->scratches, 0, bytes);
     renderer->n_blockers = gn_blockers_make(scene, renderer->blockers);
+    for (int i = 0; i < 2; i++) {
+        static const enum gn_rt_set roles[2] = {GN_RT_REAL, GN_RT_VIRTUAL};
+        if (gn_clusters_make(scene, roles[i], &renderer->clusters[i]) < 0) {
+            gn_renderer_destroy(&renderer);
+            return gn_error_set(out_error, -ENOMEM, "renderer: no memory for the scene's boxes");
+        }
+    }
     *out_renderer = renderer;
     return 0;
 }
@@ -65,8 +73,10 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     if (!self)
         return;
     for (int i = 0; i < self->n_workers && self->scratches; i++)
-        free(self->scratches[i].texel_blocked);
+        free(self->scratches[i].cut_texels);
     free(self->scratches);
+    for (int i = 0; i < 2; i++)
+        gn_clusters_finish(&self->clusters[i]);
     gn_render_lights_finish(&self->lights);
     free(self->rays);
     free(self->features);
@@ -110,17 +120,18 @@ static void update_rays(struct gn_renderer *renderer, const struct gn_camera *ca
 
 static int reserve_texels(struct gn_renderer *renderer)
 {
-    int n_words = (renderer->lights.n + 63) / 64;
+    int n_blocks = renderer->lights.n / LANES;
     for (int i = 0; i < renderer->n_workers; i++) {
         struct scratch *scratch = &renderer->scratches[i];
-        if (scratch->n_texel_words >= n_words)
+        if (scratch->n_texel_blocks >= n_blocks)
             continue;
-        free(scratch->texel_blocked);
-        scratch->n_texel_words = 0;
-        scratch->texel_blocked = malloc((size_t)n_words * sizeof(uint64_t));
-        if (!scratch->texel_blocked)
+        free(scratch->cut_texels);
+        scratch->n_texel_blocks = 0;
+        scratch->cut_texels = malloc(2 * (size_t)n_blocks * sizeof(*scratch->cut_texels));
+        if (!scratch->cut_texels)
             return -ENOMEM;
-        scratch->n_texel_words = n_words;
+        scratch->hidden_texels = scratch->cut_texels + n_blocks;
+        scratch->n_texel_blocks = n_blocks;
     }
     return 0;
 }
@@ -354,10 +365,12 @@ static void init_boxes(struct frame *frame, struct gn_renderer *renderer)
             largest = fmaxf(
                 largest, fmaxf(fabsf(frame->virtual_box.min[k]), fabsf(frame->virtual_box.max[k])));
     }
-    widen_box(&frame->virtual_box, 1e-5f * largest);
+    frame->margin = 1e-5f * largest;
+    frame->clusters = renderer->clusters;
+    widen_box(&frame->virtual_box, frame->margin);
     for (int i = 0; i < renderer->n_blockers; i++) {
         renderer->wide_blockers[i] = renderer->blockers[i];
-        widen_box(&renderer->wide_blockers[i], 1e-5f * largest);
+        widen_box(&renderer->wide_blockers[i], frame->margin);
     }
     frame->blockers = renderer->blockers;
     frame->wide_blockers = renderer->wide_blockers;
@@ -437,7 +450,7 @@ static void fill_report(const struct frame *frame, int n_workers, struct gn_rend
     report->rays_mirror = sum.rays_mirror;
     report->rays_shade = sum.rays_shade;
     report->rays_shadow = sum.rays_shadow;
-    report->n_lights = frame->lights->n;
+    report->n_lights = frame->lights->n_lit;
     report->n_virtual_pixels = sum.n_virtual_pixels;
     report->n_shadow_pixels = sum.n_shadow_pixels;
     report->n_refined_pixels = sum.n_refined_pixels;

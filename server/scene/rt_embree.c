@@ -358,6 +358,7 @@ static void trace_occluded16(const int *valid, RTCScene scene, struct RTCRay16 *
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcOccluded16(valid, scene, &context, ray);
 }
 #endif
