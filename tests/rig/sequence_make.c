@@ -26,15 +26,6 @@
 #define MAP_WIDTH 1024
 #define PATH_MAX_BYTES 4096
 
-/* The probe stands above the marker, higher than all that is on the table. */
-static const double probe_position[3] = {0, 0, 0.3};
-/* A fisheye that looks up, turned by 20 degrees about it; a light probe that looks along +x with
- * world -z downwards. Columns: the probe's x, y, z in world. */
-static const double world_from_probe[2][9] = {
-    {0.93969262078590843, -0.34202014332566871, 0, 0.34202014332566871, 0.93969262078590843, 0, 0,
-     0, 1},
-    {0, 0, 1, -1, 0, 0, 0, -1, 0},
-};
 static const char *const probe_names[2] = {"fisheye", "angular"};
 static const char *const projection_names[2] = {"fisheye-equidistant", "angular"};
 static const char *const picture_folders[GN_RIG_PICTURES] = {"camera", "camera_bounces", "truth",
@@ -195,8 +186,8 @@ static int write_probe(const struct maker *m, int light, enum gn_rig_probe probe
     struct gn_exr_channel channels[3];
     char path[PATH_MAX_BYTES];
     int size = m->o->probe_size;
-    int result = gn_rig_take_probe(&m->lights[light], probe, size, world_from_probe[probe],
-                                   probe_position, m->pool, &linear);
+    int result = gn_rig_take_probe(&m->lights[light], probe, size, gn_rig_world_from_probe[probe],
+                                   gn_rig_probe_position, m->pool, &linear);
     if (result == 0)
         result = gn_image16_init(&codes, size, size, 3);
     if (result) {
@@ -439,7 +430,7 @@ static json_t *describe_probe(const struct maker *m, enum gn_rig_probe probe, bo
 {
     json_t *e = json_object(), *response = json_object();
     double q[4];
-    gn_rig_get_quaternion(world_from_probe[probe], q);
+    gn_rig_get_quaternion(gn_rig_world_from_probe[probe], q);
     json_object_set_new(e, "projection", json_string(projection_names[probe]));
     json_object_set_new(e, "width", json_integer(m->o->probe_size));
     json_object_set_new(e, "height", json_integer(m->o->probe_size));
@@ -455,7 +446,7 @@ static json_t *describe_probe(const struct maker *m, enum gn_rig_probe probe, bo
     json_object_set_new(e, "response", response);
     json_object_set_new(e, "scale", json_real(1));
     json_object_set_new(e, "orientation", list_numbers(q, 4));
-    json_object_set_new(e, "position", list_numbers(probe_position, 3));
+    json_object_set_new(e, "position", list_numbers(gn_rig_probe_position, 3));
     return e;
 }
 

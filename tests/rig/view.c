@@ -7,6 +7,13 @@
 
 #include "tests/rig/vec.h"
 
+const double gn_rig_probe_position[3] = {0, 0, 0.3};
+const double gn_rig_world_from_probe[2][9] = {
+    {0.93969262078590843, -0.34202014332566871, 0, 0.34202014332566871, 0.93969262078590843, 0, 0,
+     0, 1},
+    {0, 0, 1, -1, 0, 0, 0, -1, 0},
+};
+
 /* Points along a pixel's side: few where they see the same, many where they differ. */
 #define FEW_POINTS 4
 #define MANY_POINTS 16

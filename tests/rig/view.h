@@ -38,6 +38,12 @@ enum gn_rig_probe {
     GN_RIG_ANGULAR = 1, // Debevec's light probe, 360 degrees: r = R theta / pi
 };
 
+/** Where the rig's probes stand, m: above the marker, higher than all that is on the table. */
+extern const double gn_rig_probe_position[3];
+/** How they look, by enum gn_rig_probe, 3x3, row-major: the fisheye up, turned by 20 degrees about
+ * that; the light probe along +x with world -z downwards. */
+extern const double gn_rig_world_from_probe[2][9];
+
 /**
  * What a probe at `position` sees of the environment: each pixel the mean radiance over the part of
  * it that lies in the circle, from 4 x 4 points, 16 x 16 where those differ; 0 outside.
