@@ -28,6 +28,7 @@
 #include "common/jpeg.h"
 #include "common/png.h"
 #include "proto/attr.h"
+#include "tests/real_data.h"
 
 static const char path[] = "unit_hostile_pictures.tmp";
 
@@ -194,8 +195,7 @@ static void test_lying_sizes(void **state)
 {
     (void)state;
     static const uint32_t sides[] = {0, 8192, 16384, 16385, 0x7fffffff, 0xffffffff};
-    struct timespec begin, end;
-    clock_gettime(CLOCK_MONOTONIC, &begin);
+    clock_t begin = clock(); // of the processor: a busy machine is no failure
     for (size_t s = 0; s < GN_ARRAY_LEN(sides); s++) {
         size_t size;
         struct gn_error error = {0};
@@ -227,32 +227,28 @@ static void test_lying_sizes(void **state)
         assert_one_line(r, &error, "Radiance");
         assert_true(sides[s] != 8192 || strstr(error.text, "cannot be in"));
     }
-    clock_gettime(CLOCK_MONOTONIC, &end);
-    assert_true(end.tv_sec - begin.tv_sec < 5);
+    assert_true(clock() - begin < 5 * CLOCKS_PER_SEC);
 }
 
-/* All files of GNOMON_DATA/folder; returns how many gave a picture, or -1 without the folder. */
+/* All files of GNOMON_DATA/folder; returns how many gave a picture. */
 static int read_folder(const char *folder, int *out_n)
 {
-    char name[4096];
-    const char *data = getenv("GNOMON_DATA");
-    snprintf(name, sizeof(name), "%s/%s", data ? data : "", folder);
-    DIR *dir = data ? opendir(name) : NULL;
+    char path_of_folder[PATH_MAX], name[PATH_MAX + 256];
+    DIR *dir = opendir(real_data_path(folder, path_of_folder));
     int n_good = 0;
     *out_n = 0;
-    if (!dir)
-        return -1;
+    assert_non_null(dir);
     for (struct dirent *entry = readdir(dir); entry; entry = readdir(dir)) {
         struct stat st;
         struct gn_image_file file;
         struct gn_error error = {0};
-        snprintf(name, sizeof(name), "%s/%s/%s", data, folder, entry->d_name);
+        snprintf(name, sizeof(name), "%s/%s", path_of_folder, entry->d_name);
         if (stat(name, &st) < 0 || !S_ISREG(st.st_mode))
             continue;
-        time_t begin = time(NULL);
+        clock_t begin = clock();
         int r = gn_image_read_file(name, &file, &error);
-        if (time(NULL) - begin > 10)
-            fail_msg("%s took more than 10 s", name);
+        if (clock() - begin > 10 * CLOCKS_PER_SEC)
+            fail_msg("%s took more than 10 s of the processor", name);
         assert_one_line(r, &error, name);
         n_good += r == 0;
         ++*out_n;
@@ -266,12 +262,7 @@ static void test_nasty_files(void **state)
 {
     (void)state;
     int n;
-    int n_good = read_folder("hdr/nasty", &n);
-    if (n_good < 0) {
-        print_message("# skipped: GNOMON_DATA does not name a folder with hdr/nasty\n");
-        skip();
-    }
-    assert_true(n_good >= 6); // those with R, G, B
+    assert_true(read_folder("hdr/nasty", &n) >= 6); // those with R, G, B
     read_folder("hdr/nasty/damaged", &n);
     assert_true(n >= 100);
 }
@@ -280,14 +271,9 @@ static void test_nasty_files(void **state)
 static void test_gradient(void **state)
 {
     (void)state;
-    char name[4096];
+    char name[PATH_MAX];
     struct gn_image_file file;
-    const char *data = getenv("GNOMON_DATA");
-    snprintf(name, sizeof(name), "%s/hdr/nasty/radiance_h_gradient.hdr", data ? data : "");
-    if (!data || access(name, R_OK) != 0) {
-        print_message("# skipped: GNOMON_DATA does not name a folder with hdr/nasty\n");
-        skip();
-    }
+    real_data_path("hdr/nasty/radiance_h_gradient.hdr", name);
     assert_int_equal(gn_image_read_file(name, &file, NULL), 0);
     for (int x = 0; x < 128; x++) {
         float value = gn_image_at(&file.linear, x, 64)[1], expected = 6.0f * (float)x / 128 + 0.1f;
@@ -299,9 +285,11 @@ static void test_gradient(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_truncations), cmocka_unit_test(test_changed_bytes),
-        cmocka_unit_test(test_lying_sizes), cmocka_unit_test(test_nasty_files),
-        cmocka_unit_test(test_gradient),
+        cmocka_unit_test(test_truncations),
+        cmocka_unit_test(test_changed_bytes),
+        cmocka_unit_test(test_lying_sizes),
+        unit_test_with_real_data(test_nasty_files, "hdr/nasty/damaged"),
+        unit_test_with_real_data(test_gradient, "hdr/nasty/radiance_h_gradient.hdr"),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,13 +11,12 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "common/exr.h"
 #include "common/projection.h"
+#include "tests/real_data.h"
 
 /* The pixel of OpenEXR's cube (faces +X, -X, +Y, -Y, +Z, -Z from the top) that shows d. */
 static const float *look_up_cube(const struct gn_image *cube, const double d[static 3])
@@ -67,17 +66,12 @@ static double compare(const struct gn_image *map, const struct gn_image *cube,
 static void test_latlong_is_openexr_cube(void **state)
 {
     (void)state;
-    char map_name[4096], cube_name[4096];
-    const char *data = getenv("GNOMON_DATA");
-    snprintf(map_name, sizeof(map_name), "%s/hdr/equirect/KernerEnvLatLong.exr", data ? data : "");
-    snprintf(cube_name, sizeof(cube_name), "%s/hdr/mapping/KernerEnvCube.exr", data ? data : "");
-    if (!data || access(map_name, R_OK) != 0 || access(cube_name, R_OK) != 0) {
-        print_message("# skipped: GNOMON_DATA does not name a folder with KernerEnv*.exr\n");
-        skip();
-    }
+    char name[PATH_MAX];
     struct gn_image map, cube;
-    assert_int_equal(gn_exr_read_file(map_name, &map, NULL, NULL), 0);
-    assert_int_equal(gn_exr_read_file(cube_name, &cube, NULL, NULL), 0);
+    real_data_path("hdr/equirect/KernerEnvLatLong.exr", name);
+    assert_int_equal(gn_exr_read_file(name, &map, NULL, NULL), 0);
+    real_data_path("hdr/mapping/KernerEnvCube.exr", name);
+    assert_int_equal(gn_exr_read_file(name, &cube, NULL, NULL), 0);
     double right = compare(&map, &cube, (double[3]){1, 1, 1});
     for (int axis = 0; axis < 3; axis++) {
         double sign[3] = {1, 1, 1};
@@ -92,6 +86,8 @@ static void test_latlong_is_openexr_cube(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_latlong_is_openexr_cube)};
+    const struct CMUnitTest tests[] = {
+        unit_test_with_real_data(test_latlong_is_openexr_cube, "hdr/mapping/KernerEnvCube.exr"),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "tests/meshes.h"
+#include "tests/real_data.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
 
@@ -391,11 +392,6 @@ static void test_absent_directory_and_huge(void **state)
 static void test_real_and_nasty_files(void **state)
 {
     (void)state;
-    const char *data = getenv("GNOMON_DATA");
-    if (!data || !data[0]) {
-        print_message("# GNOMON_DATA is unset: real meshes are not read\n");
-        skip();
-    }
     const struct {
         const char *name;
         int n_triangles; // 0: refused
@@ -419,8 +415,9 @@ static void test_real_and_nasty_files(void **state)
         {"nasty/gltf/BoxWithInfinites.glb", 0, false},
     };
     for (size_t i = 0; i < LENGTH(cases); i++) {
-        char path[512];
-        (void)snprintf(path, sizeof(path), "%s/mesh/%s", data, cases[i].name);
+        char file[128], path[PATH_MAX];
+        (void)snprintf(file, sizeof(file), "mesh/%s", cases[i].name);
+        real_data_path(file, path);
         struct gn_mesh mesh = {0};
         struct gn_error error = {0};
         int ret = gn_mesh_read_file(path, &mesh, &error);
@@ -446,7 +443,7 @@ int main(void)
         cmocka_unit_test(test_gltf_refuses),
         cmocka_unit_test(test_bad_files_are_refused),
         cmocka_unit_test(test_absent_directory_and_huge),
-        cmocka_unit_test(test_real_and_nasty_files),
+        unit_test_with_real_data(test_real_and_nasty_files, "mesh"),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
