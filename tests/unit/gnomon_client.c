@@ -169,6 +169,15 @@ static void expect_no(const struct gn_client_options *opts, int want, const char
         fail_msg("'%s' has no '%s'", why.text, words);
 }
 
+/** Connecting must fail with want and just this line. */
+static void expect_only(const struct gn_client_options *opts, int want, const char *line)
+{
+    struct gn_client *client = NULL;
+    struct gn_wire_fault why = {""};
+    assert_int_equal(gn_client_connect(opts, &client, &why), want);
+    assert_string_equal(why.text, line);
+}
+
 static void send_and_receive(struct gn_client *client, struct server *s)
 {
     (void)s;
@@ -312,7 +321,14 @@ static void test_refusals(void **state)
     strcpy(s.error.sentence, "there is 'hall' and 'lab2'");
     run(&s);
     opts = viewer(&s);
-    expect_no(&opts, -EACCES, "no room of this name: there is 'hall'");
+    expect_only(&opts, -EACCES, "there is 'hall' and 'lab2'"); // its reason once
+    stop_server(&s);
+
+    start_server(&s, SCRIPT_ERROR);
+    s.error = (struct gn_msg_error){.code = GN_MSG_ERROR_CODE_NO_SUCH_ROOM};
+    run(&s);
+    opts = viewer(&s);
+    expect_only(&opts, -EACCES, "the server has no room of this name");
     stop_server(&s);
 
     start_server(&s, SCRIPT_GARBAGE);
