@@ -21,7 +21,9 @@ SERVER = {
 }
 # The rig judges the renderer, so it may share only rays, meshes and plain pictures with it.
 RIG_SERVER = {"server/scene/rt.h", "server/scene/mesh.h"}
-RIG_NOT_COMMON = {"common/projection.h", "common/response.h", "common/camera.h", "common/composite.h"}
+RIG_NOT_COMMON = {"common/projection.h", "common/response.h", "common/camera.h",
+                  "common/composite.h"}
+SUITES = ["unit", "kernel", "golden", "numeric", "fuzz", "e2e", "style", "truth"]
 SOURCE = re.compile(r"\.(c|h|cc|cpp|hpp)$")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
@@ -118,12 +120,69 @@ def check_forbidden(root, paths):
                     yield f"{path}: {word}: {why}"
 
 
+def check_lines(root, paths):
+    for path in paths:
+        if SOURCE.search(path):
+            for n, line in enumerate(read(root, path).split("\n"), 1):
+                if len(line) > 100:
+                    yield f"{path}:{n}: {len(line)} columns; 100 are the limit"
+
+
+def check_own_header(root, paths):
+    for path in paths:
+        own = re.sub(r"\.(c|cc|cpp)$", ".h", path)
+        if own != path and own in paths:
+            first = re.search(r"^\s*#\s*include\s+(\S+)", read(root, path), re.M)
+            if not first or first[1] != f'"{own}"':
+                yield f"{path}: the first header it includes should be its own, {own}"
+
+
+def check_links(root, paths):
+    """Links of the documents, and paths between backquotes that begin with a folder of ours."""
+    tops = {p.split("/")[0] for p in paths if "/" in p}
+    for path in paths:
+        if path.endswith((".md", ".conf.example")):
+            text = re.sub(r"^```.*?^```", "", read(root, path), flags=re.M | re.S)
+            names = [os.path.join(os.path.dirname(path), link)
+                     for link in re.findall(r"\]\(([^)#\s]+)", text) if "://" not in link]
+            names += [name for name in re.findall(r"`([\w.-]+/[\w./-]*\w)[\s`]", text)
+                      if name.split("/")[0] in tops]
+            for name in names:
+                if not os.path.exists(os.path.join(root, name)):
+                    yield f"{path}: names {name}, which is not there"
+
+
+def check_machine(root, paths):
+    place = re.compile(r"(?<![\w.}$])/(home|root|Users|work|mnt|media|opt)/\w[\w./-]*")
+    for path in paths:
+        if not path.endswith((".png", ".exr")):
+            for n, line in enumerate(read(root, path).split("\n"), 1):
+                found = place.search(line)
+                if found:
+                    yield f"{path}:{n}: {found[0]} is a place on one machine"
+
+
+def check_suites(root, paths):
+    """Of each test() in our meson files; tests/run and people choose by suite."""
+    for path in paths:
+        if path.endswith("meson.build"):
+            for call in re.split(r"^\s*test\(", read(root, path), flags=re.M)[1:]:
+                call = re.split(r"^\s*(?:benchmark\(|endforeach|foreach|$)", call, flags=re.M)[0]
+                if not re.search(rf"suite: '({'|'.join(SUITES)})'", call):
+                    yield f"{path}: test({call.split(',')[0]}, ...) is in none of our suites"
+
+
 CHECKS = [("includes keep the layers", check_layers),
           ("every source file has its SPDX lines", check_spdx),
           ("nothing is marked unfinished", check_unfinished),
           ("include guards follow the path", check_guards),
           ("Embree is named in one file", check_embree),
-          ("nothing forbidden is used", check_forbidden)]
+          ("nothing forbidden is used", check_forbidden),
+          ("no line of C is over 100 columns", check_lines),
+          ("each source file includes its own header first", check_own_header),
+          ("what the documents name is there", check_links),
+          ("no path of one machine", check_machine),
+          ("every test is in a suite", check_suites)]
 
 
 def main():

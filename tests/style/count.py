@@ -3,9 +3,9 @@
 """Adds up the records that `meson test` left in the build folders.
 
 usage: count.py FAILED_BUILDS BUILD_DIR...
-Prints each failure and each skip with its reason, then "N passed, M failed[, K skipped]" as the last
-line. One failure each: a build that failed, a folder without a record or without tests, a test that
-crashed, timed out or broke its plan though no subtest of it failed, a skip that gives no reason.
+Prints each failure and each skip with its reason, and as the last line "N passed, M failed[, K
+skipped]". One failure each: a build that failed, a folder without a record or without tests, a test
+that crashed, timed out or broke its plan though no subtest of it failed, a skip without a reason.
 Exits 1 on failures.
 """
 import json
@@ -16,7 +16,7 @@ import xml.etree.ElementTree as ET
 
 
 def subtests(folder):
-    """Test -> [(subtest, outcome, reason)]: the JUnit record, which is written when all have run."""
+    """Test -> [(subtest, outcome, reason)]: the JUnit record, written when all have run."""
     root = ET.parse(os.path.join(folder, "meson-logs", "testlog.junit.xml")).getroot()
     found = {}  # the class name is "project." and the test's name
     for case in root.iter("testcase"):

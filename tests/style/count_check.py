@@ -61,7 +61,8 @@ def run_cases(top):
     lines = ["project('p')"]
     for i, (_, script, _, _) in enumerate(CASES):
         lines.append(f"test('t{i}', find_program('sh'), args: ['-c', {quoted(script)}],\n"
-                     f"  protocol: 'tap', suite: 's{i}', timeout: {1 if 'sleep' in script else 600})")
+                     f"  protocol: 'tap', suite: 's{i}',"
+                     f" timeout: {1 if 'sleep' in script else 600})")
     write(os.path.join(top, "meson.build"), "\n".join(lines) + "\n")
     build = os.path.join(top, "build")
     subprocess.run([sys.argv[2], "setup", build, top], check=True, stdout=subprocess.DEVNULL)
