@@ -14,8 +14,6 @@
 
 // Clusters of fewer triangles are not cut.
 #define MIN_TRIANGLES 8
-// Clusters of more triangles do not keep their vertices.
-#define MAX_TRIANGLES 64
 
 static const struct box empty_box = {{INFINITY, INFINITY, INFINITY},
                                      {-INFINITY, -INFINITY, -INFINITY}};
@@ -160,7 +158,7 @@ static void fill_cluster(const struct build *build, int c, struct clusters *out)
     struct cluster *cluster = &out->cluster[out->n++];
     cluster->box = empty_box;
     cluster->first_vertex = out->n_vertices;
-    bool keeps = build->size[c] <= MAX_TRIANGLES;
+    bool keeps = build->size[c] <= CLUSTER_TRIANGLES;
     for (int i = 0; i < build->size[c]; i++) {
         float p[3][3];
         get_corners(build->scene, build->members[build->first[c] + i], p);
@@ -175,6 +173,7 @@ static void fill_cluster(const struct build *build, int c, struct clusters *out)
     }
     if (!keeps)
         keep_box(&cluster->box, out);
+    cluster->has_edges = keeps;
     cluster->n_vertices = out->n_vertices - cluster->first_vertex;
 }
 
@@ -192,7 +191,7 @@ int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct c
         goto out;
     int n_clusters = cut_all(build, ret);
     for (int k = 0; k < 3; k++) {
-        out->vertices[k] = malloc(MAX_CLUSTERS * 3 * MAX_TRIANGLES * sizeof(float));
+        out->vertices[k] = malloc(MAX_CLUSTERS * 3 * CLUSTER_TRIANGLES * sizeof(float));
         if (!out->vertices[k]) {
             gn_clusters_finish(out);
             ret = -ENOMEM;
@@ -201,7 +200,9 @@ int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct c
     }
     for (int c = 0; c < n_clusters; c++)
         fill_cluster(build, c, out);
-    ret = 0;
+    ret = gn_edges_make(out);
+    if (ret < 0)
+        gn_clusters_finish(out);
 out:
     if (build)
         free(build->members);
@@ -213,6 +214,7 @@ void gn_clusters_finish(struct clusters *clusters)
 {
     for (int k = 0; k < 3; k++)
         free(clusters->vertices[k]);
+    free(clusters->edges);
     memset(clusters, 0, sizeof(*clusters));
 }
 
@@ -234,18 +236,24 @@ static bool is_under(const struct clusters *clusters, const struct cluster *clus
 }
 
 int gn_clusters_list_above(const struct clusters *clusters, const float org[static 3],
-                           const float normal[static 3], float margin, struct box *out_boxes)
+                           const float normal[static 3], float margin, int n,
+                           struct seen_cluster *out, struct outline *outlines)
 {
-    int n = 0;
+    int n_outlines = n > 0 ? out[n - 1].first_outline + out[n - 1].n_outlines : 0;
     for (int c = 0; c < clusters->n; c++) {
         const struct cluster *cluster = &clusters->cluster[c];
         if (is_under(clusters, cluster, org, normal))
             continue;
+        struct seen_cluster *seen = &out[n++];
         for (int k = 0; k < 3; k++) {
-            out_boxes[n].min[k] = cluster->box.min[k] - org[k] - margin;
-            out_boxes[n].max[k] = cluster->box.max[k] - org[k] + margin;
+            seen->box.min[k] = cluster->box.min[k] - org[k] - margin;
+            seen->box.max[k] = cluster->box.max[k] - org[k] + margin;
         }
-        n++;
+        seen->has_outlines = cluster->has_edges;
+        seen->first_outline = n_outlines;
+        seen->n_outlines =
+            gn_edges_list_outlines(clusters, cluster, org, margin, outlines + n_outlines);
+        n_outlines += seen->n_outlines;
     }
     return n;
 }

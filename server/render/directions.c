@@ -5,7 +5,8 @@
  * of 16 boxes of directions at once. All loops are over 16 lanes, for the compiler to vectorise.
  *
  * A ray from the origin with a direction of the box D = [a, b] meets the box [lo, hi] only if there
- * is a t > 0 with t a <= hi and t b >= lo on each axis: six bounds of t.
+ * is a t > 0 with t a <= hi and t b >= lo on each axis: six bounds of t. Where hi >= 0 the first is
+ * t <= hi / a for a > 0, else none; where hi < 0 it is t >= hi / a for a < 0, else there is no t.
  */
 #include "server/render/internal.h"
 
@@ -14,8 +15,11 @@
 
 // Wider than the rounding of directions and of their products.
 #define WIDEN 1e-6f
-// Components are kept off zero by less than this, outwards.
-#define TINY 1e-12f
+// In place of 1 / 0: times a length it is farther than FAR.
+#define HUGE_INVERSE 3e38f
+#define FAR 1e28f
+// m; a box's sides are no nearer to the origin, outwards, so that 0 times HUGE_INVERSE is none.
+#define NEAR 1e-15f
 
 static inline float min2(float a, float b)
 {
@@ -35,8 +39,10 @@ void gn_directions_set_box(struct direction_boxes *boxes, int lane, const struct
         float b = is_empty ? 0 : box->max[k] + WIDEN;
         boxes->min[k][lane] = a;
         boxes->max[k][lane] = b;
-        boxes->inverse_min[k][lane] = 1 / (fabsf(a) < TINY ? -TINY : a);
-        boxes->inverse_max[k][lane] = 1 / (fabsf(b) < TINY ? TINY : b);
+        boxes->min_rises[k][lane] = a > 0 ? min2(1 / a, HUGE_INVERSE) : HUGE_INVERSE;
+        boxes->min_falls[k][lane] = a < 0 ? max2(1 / a, -HUGE_INVERSE) : -HUGE_INVERSE;
+        boxes->max_rises[k][lane] = b > 0 ? min2(1 / b, HUGE_INVERSE) : HUGE_INVERSE;
+        boxes->max_falls[k][lane] = b < 0 ? max2(1 / b, -HUGE_INVERSE) : -HUGE_INVERSE;
     }
 }
 
@@ -48,6 +54,18 @@ static unsigned pack(const int32_t flags[static LANES])
     return mask;
 }
 
+static void keep_below(float t[static LANES], float side, const float inverse[static LANES])
+{
+    for (int i = 0; i < LANES; i++)
+        t[i] = min2(t[i], side * inverse[i]);
+}
+
+static void keep_above(float t[static LANES], float side, const float inverse[static LANES])
+{
+    for (int i = 0; i < LANES; i++)
+        t[i] = max2(t[i], side * inverse[i]);
+}
+
 unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct box *box)
 {
     float t0[LANES];
@@ -55,41 +73,64 @@ unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct bo
     int32_t flags[LANES];
     for (int i = 0; i < LANES; i++) {
         t0[i] = 0;
-        t1[i] = INFINITY;
+        t1[i] = FAR;
     }
     for (int k = 0; k < 3; k++) {
-        for (int i = 0; i < LANES; i++) {
-            float upper = box->max[k] * boxes->inverse_min[k][i];
-            float lower = box->min[k] * boxes->inverse_max[k][i];
-            bool a_rises = boxes->inverse_min[k][i] > 0;
-            bool b_rises = boxes->inverse_max[k][i] > 0;
-            t1[i] = min2(t1[i], a_rises ? upper : INFINITY);
-            t0[i] = max2(t0[i], a_rises ? 0 : upper);
-            t0[i] = max2(t0[i], b_rises ? lower : 0);
-            t1[i] = min2(t1[i], b_rises ? INFINITY : lower);
-        }
+        float hi = box->max[k];
+        float lo = box->min[k];
+        if (hi >= 0)
+            keep_below(t1, max2(hi, NEAR), boxes->min_rises[k]);
+        else
+            keep_above(t0, hi, boxes->min_falls[k]);
+        if (lo <= 0)
+            keep_below(t1, min2(lo, -NEAR), boxes->max_falls[k]);
+        else
+            keep_above(t0, lo, boxes->max_rises[k]);
     }
     for (int i = 0; i < LANES; i++)
         flags[i] = t0[i] <= t1[i] * (1 + 4e-6f);
     return pack(flags);
 }
 
+/** Bounds of n . d over each box. */
+static void get_bounds(const struct direction_boxes *boxes, const float n[static 3],
+                       float low[static LANES], float high[static LANES])
+{
+    for (int i = 0; i < LANES; i++)
+        low[i] = high[i] = 0;
+    for (int k = 0; k < 3; k++) {
+        const float *a = n[k] > 0 ? boxes->min[k] : boxes->max[k];
+        const float *b = n[k] > 0 ? boxes->max[k] : boxes->min[k];
+        for (int i = 0; i < LANES; i++) {
+            low[i] += n[k] * a[i];
+            high[i] += n[k] * b[i];
+        }
+    }
+}
+
+unsigned gn_directions_cross(const struct direction_boxes *boxes, const struct outline *outline)
+{
+    float low[LANES];
+    float high[LANES];
+    int32_t flags[LANES];
+    get_bounds(boxes, outline->plane, low, high);
+    for (int i = 0; i < LANES; i++)
+        flags[i] = (low[i] <= WIDEN) & (high[i] >= -WIDEN);
+    unsigned crossed = pack(flags);
+    return crossed ? crossed & gn_directions_meet(boxes, &outline->box) : 0;
+}
+
 void gn_directions_split(const struct direction_boxes *boxes, const float n[static 3],
                          unsigned *out_some, unsigned *out_all)
 {
+    float low[LANES];
+    float high[LANES];
     int32_t some[LANES];
     int32_t all[LANES];
+    get_bounds(boxes, n, low, high);
     for (int i = 0; i < LANES; i++) {
-        float low = 0;
-        float high = 0;
-        for (int k = 0; k < 3; k++) {
-            float a = n[k] * boxes->min[k][i];
-            float b = n[k] * boxes->max[k][i];
-            low += min2(a, b);
-            high += max2(a, b);
-        }
-        some[i] = high > 0;
-        all[i] = low > 0;
+        some[i] = high[i] > 0;
+        all[i] = low[i] > 0;
     }
     *out_some = pack(some);
     *out_all = pack(all);

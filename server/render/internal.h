@@ -24,6 +24,10 @@
 #define MAX_BLOCKERS 64
 /** Clusters of a set's triangles. */
 #define MAX_CLUSTERS 64
+/** Most triangles of a cluster that keeps its vertices and edges. */
+#define CLUSTER_TRIANGLES 64
+/** Most outlines of both sets. */
+#define MAX_OUTLINES (2 * MAX_CLUSTERS * CLUSTER_TRIANGLES * 3)
 /** Directions of a group: 16 blocks of 16. */
 #define GROUP (LANES * LANES)
 
@@ -63,12 +67,14 @@ struct box {
 };
 
 /** Boxes of 16 sets of unit directions, widened against rounding; an empty set's has no direction
- * in it, only 0. The inverses are of the numbers above, kept off zero. */
+ * in it, only 0. */
 struct direction_boxes {
     _Alignas(64) float min[3][LANES];
     _Alignas(64) float max[3][LANES];
-    _Alignas(64) float inverse_min[3][LANES];
-    _Alignas(64) float inverse_max[3][LANES];
+    _Alignas(64) float min_rises[3][LANES]; // 1 / min where it is > 0, else huge
+    _Alignas(64) float min_falls[3][LANES]; // 1 / min where it is < 0, else -huge
+    _Alignas(64) float max_rises[3][LANES];
+    _Alignas(64) float max_falls[3][LANES];
 };
 
 /** 16 blocks of 16 lights each, all near each other. */
@@ -95,8 +101,38 @@ struct light_list {
 
 /** Some triangles that are near each other. */
 struct cluster {
-    struct box box; // exact
-    int first_vertex, n_vertices;
+    struct box box;               // exact
+    int first_vertex, n_vertices; // three for each triangle; of many triangles: the box's corners
+    bool has_edges;               // false: of too many triangles
+    int first_edge, n_edges;
+};
+
+/** An edge and what its triangles have beside it. */
+struct edge {
+    float ends[6];
+    float apex[2][3];
+    bool has_two; // triangles; else one, or more than two, and apex says nothing
+    int cluster;
+};
+
+/** An edge that bounds what is seen from a point. */
+struct outline {
+    struct box box; // relative to the point, widened
+    float plane[3]; // normal to both ends' directions
+};
+
+/** Where in 16 groups of directions it may change whether a ray is stopped. */
+struct change {
+    const struct outline *outline; // NULL: anywhere in the box
+    const struct box *box;
+    unsigned groups;
+};
+
+/** A cluster as a point sees it. */
+struct seen_cluster {
+    struct box box; // relative to the point, widened
+    bool has_outlines;
+    int first_outline, n_outlines;
 };
 
 /** A set's triangles, each in one cluster. */
@@ -105,7 +141,8 @@ struct clusters {
     int n;
     struct cluster cluster[MAX_CLUSTERS];
     int n_vertices;
-    float *vertices[3]; // world; of clusters of many triangles their box's corners, owned
+    float *vertices[3]; // world, owned
+    struct edge *edges; // owned; an edge of triangles of two clusters is in one of them
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -149,7 +186,9 @@ struct scratch {
     // objects hide light i from the sample at hand.
     uint16_t *cut_texels, *hidden_texels; // [n_texel_blocks]
     int n_texel_blocks;
-    struct box near[2 * MAX_CLUSTERS]; // of clusters above the sample's horizon, seen from it
+    struct seen_cluster near[2 * MAX_CLUSTERS]; // those above the sample's horizon
+    struct outline outlines[MAX_OUTLINES];
+    struct change changes[MAX_OUTLINES + 2 * MAX_CLUSTERS]; // in 16 groups of directions
 };
 
 /** What one tile adds to the report; summed in the order of tiles. */
@@ -257,11 +296,19 @@ int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static M
 GN_MUST_USE int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role,
                                  struct clusters *out);
 void gn_clusters_finish(struct clusters *clusters);
-/** The boxes, widened by margin and relative to org, of clusters that are not wholly in or under
- * the plane through org: no ray that leaves upwards meets the others. Returns their number, at most
- * MAX_CLUSTERS. */
+/** Adds to out[n] and their outlines the clusters that are not wholly in or under the plane through
+ * org: no ray that leaves upwards meets the others. Returns the new n. */
 int gn_clusters_list_above(const struct clusters *clusters, const float org[static 3],
-                           const float normal[static 3], float margin, struct box *out_boxes);
+                           const float normal[static 3], float margin, int n,
+                           struct seen_cluster *out, struct outline *outlines);
+
+/* edges.c */
+
+/** Fills the edges of the clusters that have them. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_edges_make(struct clusters *clusters);
+/** Those of a cluster's edges that bound what is seen from org. Returns their number. */
+int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster *cluster,
+                           const float org[static 3], float margin, struct outline *out);
 
 /* directions.c */
 
@@ -271,6 +318,8 @@ void gn_directions_fill_groups(struct light_list *list);
 void gn_directions_set_box(struct direction_boxes *boxes, int lane, const struct box *box);
 /** Bit i: unless all rays from the origin with a direction of box i surely miss `box`. */
 unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct box *box);
+/** Bit i: unless the outline surely crosses no direction of box i. */
+unsigned gn_directions_cross(const struct direction_boxes *boxes, const struct outline *outline);
 /** Bit i: box i may hold a direction above the plane across n; surely holds no other. */
 void gn_directions_split(const struct direction_boxes *boxes, const float n[static 3],
                          unsigned *out_some, unsigned *out_all);

@@ -4,10 +4,10 @@
  * The judge: every direction of the radiance map, exact visibility, no light extraction. For each
  * sample by itself: which directions above its horizon are hidden, then the sums.
  *
- * Left out, and no bit of the result with them, are rays that surely meet nothing. Of a set's
- * clusters of triangles only those matter that are not wholly under the receiver's tangent plane;
- * a group of directions, then each of its blocks, is traced only where the box of its directions
- * may meet the box of such a cluster. A block is a packet.
+ * Left out, and no bit of the result with them, are rays whose fate is known. Of a set's clusters
+ * of triangles only those matter that are not wholly under the receiver's tangent plane; a group of
+ * directions is looked at only where its box may meet the box of such a cluster. A block that no
+ * outline crosses (edges.c) has one ray for all its directions; each other block is a packet.
  * The sum over a block or a group that is wholly open and above the horizon, sum Phi_i (n . d_i),
  * is n . (sum Phi_i d_i), which is known.
  */
@@ -43,6 +43,9 @@ static void split_by_horizon(const struct direction_boxes *boxes, const struct s
     unsigned some;
     unsigned all;
     gn_directions_split(boxes, s->surface.normal_geometric, out_some, out_all);
+    if (memcmp(s->surface.normal_geometric, s->surface.normal_shading,
+               sizeof(s->surface.normal_shading)) == 0)
+        return;
     gn_directions_split(boxes, s->surface.normal_shading, &some, &all);
     *out_some &= some;
     *out_all &= all;
@@ -60,6 +63,18 @@ static void aim_packet(struct gn_rt_packet *packet, const struct sample *s)
     }
 }
 
+/** Traces the packet's lanes of the mask; bit i: lane i is hidden. */
+static unsigned trace(const struct frame *frame, struct gn_rt_packet *packet, enum gn_rt_set set,
+                      unsigned mask, uint64_t *rays)
+{
+    for (int i = 0; i < LANES; i++) {
+        packet->valid[i] = mask >> i & 1 ? -1 : 0;
+        *rays += mask >> i & 1;
+    }
+    return gn_rt_get_occluded16(frame->rt, set, packet);
+}
+
+/** A ray for each light of the block that is above the horizon. */
 static unsigned trace_block(const struct frame *frame, struct scratch *scratch,
                             const struct sample *s, enum gn_rt_set set, int block, uint64_t *rays)
 {
@@ -73,40 +88,109 @@ static unsigned trace_block(const struct frame *frame, struct scratch *scratch,
     memcpy(packet->dir_x, lights->dir[0] + first, sizeof(packet->dir_x));
     memcpy(packet->dir_y, lights->dir[1] + first, sizeof(packet->dir_y));
     memcpy(packet->dir_z, lights->dir[2] + first, sizeof(packet->dir_z));
-    for (int i = 0; i < LANES; i++) {
-        packet->valid[i] = mask >> i & 1 ? -1 : 0;
-        *rays += mask >> i & 1;
-    }
-    return gn_rt_get_occluded16(frame->rt, set, packet);
+    return trace(frame, packet, set, mask, rays);
 }
 
-/** Of 16 boxes of directions, those that may meet one of the listed boxes; and for each lane, which
- * it may meet. */
-static unsigned find_near(const struct direction_boxes *directions, const struct box *boxes,
-                          const uint8_t *list, int n_list, unsigned asked,
-                          uint16_t out_lanes[static 2 * MAX_CLUSTERS])
+/** One ray for each of the group's blocks, which no outline crosses, for all its lights.
+ * above: which are wholly above the horizon. */
+static void trace_uniform(const struct frame *frame, struct scratch *scratch,
+                          const struct sample *s, enum gn_rt_set set, int group, unsigned blocks,
+                          unsigned above, uint16_t *masks, uint64_t *rays)
+{
+    const struct light_list *lights = frame->lights;
+    struct gn_rt_packet *packet = &scratch->packet;
+    unsigned lanes[LANES];
+    unsigned asked = 0;
+    for (int b = 0; b < LANES; b++) {
+        int block = group * LANES + b;
+        int light = block * LANES;
+        float cosines[LANES];
+        lanes[b] = !(blocks >> b & 1) ? 0
+                   : above >> b & 1   ? lights->groups[group].lit[b]
+                                      : get_cosines(lights, s, block, cosines);
+        while (lanes[b] && !(lanes[b] >> (light % LANES) & 1))
+            light++;
+        packet->dir_x[b] = lights->dir[0][light];
+        packet->dir_y[b] = lights->dir[1][light];
+        packet->dir_z[b] = lights->dir[2][light];
+        asked |= (unsigned)(lanes[b] != 0) << b;
+    }
+    if (asked == 0)
+        return;
+    unsigned hidden = trace(frame, packet, set, asked, rays);
+    for (int b = 0; b < LANES; b++) {
+        if (hidden >> b & 1)
+            masks[group * LANES + b] = (uint16_t)lanes[b];
+    }
+}
+
+/** The blocks of group i of 16 in which it may change whether a ray is stopped. */
+static unsigned find_crossed(const struct scratch *scratch, int n_changes, int i,
+                             const struct light_group *group)
+{
+    unsigned crossed = 0;
+    for (int j = 0; j < n_changes; j++) {
+        const struct change *change = &scratch->changes[j];
+        if (change->groups >> i & 1)
+            crossed |= change->outline ? gn_directions_cross(&group->blocks, change->outline)
+                                       : gn_directions_meet(&group->blocks, change->box);
+    }
+    return crossed;
+}
+
+/** Marks what the set hides of a group; `crossed`: its blocks that need a ray for each light. */
+static void trace_group(const struct frame *frame, struct scratch *scratch, const struct sample *s,
+                        enum gn_rt_set set, int group, unsigned crossed, uint16_t *masks,
+                        uint64_t *rays)
+{
+    const struct light_group *lights = &frame->lights->groups[group];
+    unsigned some;
+    unsigned all;
+    split_by_horizon(&lights->blocks, s, &some, &all);
+    crossed &= some;
+    for (int b = 0; crossed >> b; b++) {
+        int block = group * LANES + b;
+        if (crossed >> b & 1)
+            masks[block] = (uint16_t)trace_block(frame, scratch, s, set, block, rays);
+    }
+    if (some & ~crossed)
+        trace_uniform(frame, scratch, s, set, group, some & ~crossed, all, masks, rays);
+}
+
+/** Of 16 groups those that the near clusters may meet; fills scratch->changes. */
+static unsigned find_changes(struct scratch *scratch, int n_near,
+                             const struct direction_boxes *boxes, unsigned above, int *out_n)
 {
     unsigned any = 0;
-    for (int i = 0; i < n_list; i++) {
-        unsigned lanes = gn_directions_meet(directions, &boxes[list[i]]) & asked;
-        out_lanes[i] = (uint16_t)lanes;
-        any |= lanes;
+    int n = 0;
+    for (int j = 0; j < n_near; j++) {
+        const struct seen_cluster *seen = &scratch->near[j];
+        unsigned groups = gn_directions_meet(boxes, &seen->box) & above;
+        any |= groups;
+        if (groups && !seen->has_outlines)
+            scratch->changes[n++] = (struct change){NULL, &seen->box, groups};
+        for (int i = 0; i < seen->n_outlines && groups; i++) {
+            const struct outline *outline = &scratch->outlines[seen->first_outline + i];
+            unsigned crossed = gn_directions_cross(boxes, outline) & groups;
+            if (crossed)
+                scratch->changes[n++] = (struct change){outline, NULL, crossed};
+        }
     }
+    *out_n = n;
     return any;
 }
 
-/** The group's blocks that are above the horizon and may meet something. */
-static unsigned choose_blocks(const struct frame *frame, const struct scratch *scratch,
-                              const struct sample *s, const struct light_group *group,
-                              const uint8_t *list, int n_list)
+/** Fills scratch->near. Returns their number. */
+static int find_near(const struct frame *frame, struct scratch *scratch, const struct sample *s,
+                     enum gn_rt_set set)
 {
-    unsigned some;
-    unsigned all;
-    uint16_t lanes[2 * MAX_CLUSTERS];
-    split_by_horizon(&group->blocks, s, &some, &all);
-    if (!frame->cull || some == 0)
-        return some;
-    return find_near(&group->blocks, scratch->near, list, n_list, some, lanes);
+    int n = 0;
+    for (int i = 0; i < 2; i++) {
+        if (set & frame->clusters[i].role)
+            n = gn_clusters_list_above(&frame->clusters[i], s->org, s->surface.normal_geometric,
+                                       frame->margin, n, scratch->near, scratch->outlines);
+    }
+    return n;
 }
 
 /** Marks in masks[block] the directions that the set hides. True where there is one. */
@@ -114,48 +198,32 @@ static bool find_hidden(const struct frame *frame, struct scratch *scratch, cons
                         enum gn_rt_set set, uint16_t *masks, uint64_t *rays)
 {
     const struct light_list *lights = frame->lights;
-    uint8_t everything[2 * MAX_CLUSTERS];
+    int n_blocks = lights->n / LANES;
     unsigned found = 0;
-    int n_near = 0;
-    memset(masks, 0, (size_t)lights->n / LANES * sizeof(*masks));
-    for (int i = 0; i < 2 && frame->cull; i++) {
-        if (set & frame->clusters[i].role)
-            n_near +=
-                gn_clusters_list_above(&frame->clusters[i], s->org, s->surface.normal_geometric,
-                                       frame->margin, scratch->near + n_near);
-    }
+    int n_near = frame->cull ? find_near(frame, scratch, s, set) : 0;
+    memset(masks, 0, (size_t)n_blocks * sizeof(*masks));
     if (frame->cull && n_near == 0)
         return false;
-    for (int i = 0; i < n_near; i++)
-        everything[i] = (uint8_t)i;
     aim_packet(&scratch->packet, s);
     for (int first = 0; first < lights->n_groups; first += LANES) {
         const struct direction_boxes *boxes = &lights->group_boxes[first / LANES];
-        uint16_t lanes[2 * MAX_CLUSTERS];
-        unsigned groups;
+        unsigned above;
         unsigned all;
-        split_by_horizon(boxes, s, &groups, &all);
-        if (frame->cull && groups)
-            groups = find_near(boxes, scratch->near, everything, n_near, groups, lanes);
+        int n_changes = 0;
+        split_by_horizon(boxes, s, &above, &all);
+        unsigned groups =
+            above && frame->cull ? find_changes(scratch, n_near, boxes, above, &n_changes) : above;
         for (int i = 0; groups >> i; i++) {
-            uint8_t list[2 * MAX_CLUSTERS];
-            int n_list = 0;
+            int group = first + i;
             if (!(groups >> i & 1))
                 continue;
-            for (int j = 0; j < n_near; j++) {
-                list[n_list] = (uint8_t)j;
-                n_list += lanes[j] >> i & 1;
-            }
-            unsigned blocks =
-                choose_blocks(frame, scratch, s, &lights->groups[first + i], list, n_list);
-            for (int b = 0; blocks >> b; b++) {
-                int block = (first + i) * LANES + b;
-                if (blocks >> b & 1)
-                    masks[block] = (uint16_t)trace_block(frame, scratch, s, set, block, rays);
-                found |= masks[block];
-            }
+            unsigned crossed =
+                frame->cull ? find_crossed(scratch, n_changes, i, &lights->groups[group]) : ~0u;
+            trace_group(frame, scratch, s, set, group, crossed, masks, rays);
         }
     }
+    for (int b = 0; b < n_blocks; b++)
+        found |= masks[b];
     return found != 0;
 }
 

@@ -1,0 +1,159 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * Where what is hidden from a point can change. Seen from any point, the set of directions in which
+ * triangles stand is bounded by outlines: edges whose two triangles are on the same side of the
+ * plane through the point and the edge, and edges that have no second triangle. So in a connected
+ * set of directions that no outline crosses either every ray is stopped or none is.
+ */
+#include "server/render/internal.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// A triangle seen so nearly edge-on (rad) may be seen from either side.
+#define EDGE_ON 1e-6
+
+/** One side of a triangle; ends are in order, so that the other triangle's side compares equal. */
+struct side {
+    float ends[6];
+    float apex[3];
+    int cluster;
+};
+
+static int compare_sides(const void *a, const void *b)
+{
+    const struct side *x = a;
+    const struct side *y = b;
+    for (int i = 0; i < 6; i++) {
+        if (x->ends[i] != y->ends[i])
+            return x->ends[i] < y->ends[i] ? -1 : 1;
+    }
+    return 0;
+}
+
+static int compare_edges(const void *a, const void *b)
+{
+    const struct edge *x = a;
+    const struct edge *y = b;
+    return (x->cluster > y->cluster) - (x->cluster < y->cluster);
+}
+
+static bool comes_first(const float a[static 3], const float b[static 3])
+{
+    for (int k = 0; k < 3; k++) {
+        if (a[k] != b[k])
+            return a[k] < b[k];
+    }
+    return true;
+}
+
+static void add_sides(const struct clusters *clusters, int c, struct side **next)
+{
+    const struct cluster *cluster = &clusters->cluster[c];
+    for (int i = 0; i < cluster->n_vertices; i++) {
+        float p[3][3];
+        for (int j = 0; j < 3; j++) {
+            int vertex = cluster->first_vertex + i / 3 * 3 + (i + j) % 3;
+            for (int k = 0; k < 3; k++)
+                p[j][k] = clusters->vertices[k][vertex];
+        }
+        bool is_ordered = comes_first(p[0], p[1]);
+        struct side *side = (*next)++;
+        memcpy(side->ends, p[is_ordered ? 0 : 1], sizeof(p[0]));
+        memcpy(side->ends + 3, p[is_ordered ? 1 : 0], sizeof(p[0]));
+        memcpy(side->apex, p[2], sizeof(p[2]));
+        side->cluster = c;
+    }
+}
+
+/** Edges from sides in order: two equal ones make one with two triangles. */
+static int pair_sides(const struct side *sides, int n, struct edge *out)
+{
+    int n_edges = 0;
+    for (int i = 0, end; i < n; i = end) {
+        for (end = i + 1; end < n && compare_sides(&sides[i], &sides[end]) == 0; end++)
+            continue;
+        struct edge *edge = &out[n_edges++];
+        memcpy(edge->ends, sides[i].ends, sizeof(edge->ends));
+        memcpy(edge->apex[0], sides[i].apex, sizeof(edge->apex[0]));
+        memcpy(edge->apex[1], sides[end - 1].apex, sizeof(edge->apex[1]));
+        edge->has_two = end - i == 2;
+        edge->cluster = sides[i].cluster;
+    }
+    return n_edges;
+}
+
+int gn_edges_make(struct clusters *clusters)
+{
+    int n = 0;
+    for (int c = 0; c < clusters->n; c++)
+        n += clusters->cluster[c].has_edges ? clusters->cluster[c].n_vertices : 0;
+    if (n == 0)
+        return 0;
+    struct side *sides = malloc((size_t)n * sizeof(*sides));
+    clusters->edges = malloc((size_t)n * sizeof(*clusters->edges));
+    if (!sides || !clusters->edges) {
+        free(sides);
+        return -ENOMEM; // edges go with the clusters
+    }
+    struct side *next = sides;
+    for (int c = 0; c < clusters->n; c++) {
+        if (clusters->cluster[c].has_edges)
+            add_sides(clusters, c, &next);
+    }
+    qsort(sides, (size_t)n, sizeof(*sides), compare_sides);
+    int n_edges = pair_sides(sides, n, clusters->edges);
+    free(sides);
+    qsort(clusters->edges, (size_t)n_edges, sizeof(*clusters->edges), compare_edges);
+    for (int i = n_edges - 1; i >= 0; i--) {
+        struct cluster *cluster = &clusters->cluster[clusters->edges[i].cluster];
+        cluster->first_edge = i;
+        cluster->n_edges++;
+    }
+    return 0;
+}
+
+static double dot(const double a[static 3], const double b[static 3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** -1, 0, 1: the side of the plane that the apex lies on; 0: not sure. */
+static int get_side(const double plane[static 3], const float apex[static 3],
+                    const float org[static 3])
+{
+    const double p[3] = {(double)apex[0] - org[0], (double)apex[1] - org[1],
+                         (double)apex[2] - org[2]};
+    double x = dot(plane, p);
+    double limit = EDGE_ON * sqrt(dot(plane, plane) * dot(p, p));
+    return (x > limit) - (x < -limit);
+}
+
+int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster *cluster,
+                           const float org[static 3], float margin, struct outline *out)
+{
+    int n = 0;
+    for (int i = 0; i < cluster->n_edges; i++) {
+        const struct edge *edge = &clusters->edges[cluster->first_edge + i];
+        const float *e = edge->ends;
+        const double a[3] = {(double)e[0] - org[0], (double)e[1] - org[1], (double)e[2] - org[2]};
+        const double b[3] = {(double)e[3] - org[0], (double)e[4] - org[1], (double)e[5] - org[2]};
+        const double plane[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                                 a[0] * b[1] - a[1] * b[0]};
+        if (edge->has_two &&
+            get_side(plane, edge->apex[0], org) * get_side(plane, edge->apex[1], org) < 0)
+            continue;
+        // Not to unit length: where the point is nearly in line with the edge, all is near it.
+        double length = sqrt(dot(a, a) * dot(b, b));
+        struct outline *outline = &out[n++];
+        for (int k = 0; k < 3; k++) {
+            outline->plane[k] = length > 0 ? (float)(plane[k] / length) : 0;
+            outline->box.min[k] = (float)fmin(a[k], b[k]) - margin;
+            outline->box.max[k] = (float)fmax(a[k], b[k]) + margin;
+        }
+    }
+    return n;
+}
