@@ -78,7 +78,7 @@ static void init_stage(struct gn_test_stage *stage, int things, int n_threads)
         gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.2f, 12), -0.9, 0, 0.3,
                           GN_MATERIAL_MIRROR, grey);
     gn_test_stage_commit(stage, n_threads);
-    gn_test_stage_set_map(stage, 32, 16, paint_room, NULL);
+    gn_test_stage_set_map(stage, 16, 8, paint_room, NULL);
     gn_test_stage_set_lights_from_map(stage, 2);
     gn_test_stage_aim(stage, 45, 35, 40, eye, target); // no multiple of a tile
 }
