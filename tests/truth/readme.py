@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""Runs the commands that README.md gives. TAP on stdout.
+
+usage: readme.py SOURCE_ROOT BUILD_ROOT GNOMON_RIG
+Each ```sh block is run by a shell as it stands: deploy/quickstart in the source tree, the others in a
+folder with the files that the README names. `tests/run` is not run by one of its own tests.
+"""
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+
+
+def get_blocks(root):
+    with open(os.path.join(root, "README.md"), encoding="utf-8") as f:
+        return [b.strip() for b in re.findall(r"^```sh\n(.*?)^```", f.read(), re.S | re.M)]
+
+
+def run(block, folder, env):
+    """Runs the block in a session of its own, and ends what it left in the background."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+        shell = subprocess.Popen(["sh", "-e", "-c", block], cwd=folder, env=env, stdout=log,
+                                 stderr=subprocess.STDOUT, start_new_session=True)
+        try:
+            status = shell.wait()
+        finally:
+            try:
+                os.killpg(shell.pid, signal.SIGTERM)
+            except ProcessLookupError:
+                pass
+        log.seek(0)
+        text = log.read()
+    for line in text.splitlines():
+        print("# " + line)
+    if status:
+        raise RuntimeError(f"exit status {status}")
+    return text
+
+
+def prepare(rig, folder):
+    """What the README tells its reader to put into a folder."""
+    sequence = os.path.join(folder, "sequence")
+    subprocess.run([rig, "make", "--width", "160", "--height", "120", "--frames-per-light", "1",
+                    "--paths", "8", sequence], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL)
+    for name in os.listdir(sequence):
+        if name.endswith((".obj", ".mtl")) or name in ("scene.json", "camera.json"):
+            shutil.copy(os.path.join(sequence, name), folder)
+    # A lat-long map; the rig's angular one is taken for such, as only the commands are tested.
+    shutil.copy(os.path.join(sequence, "env", "angular-3.exr"), os.path.join(folder, "light.exr"))
+    os.mkdir(os.path.join(folder, "shots"))
+    for i in range(2):
+        shutil.copy(os.path.join(sequence, "camera", "0000.png"),
+                    os.path.join(folder, "shots", f"{i}.png"))
+    with open(os.path.join(folder, "gnomond.conf"), "w", encoding="utf-8") as f:
+        f.write("[room studio]\nscene = scene.json\n")
+
+
+def check_quickstart(root, text):
+    out = os.path.join(root, "quickstart-out")
+    with open(os.path.join(out, "report.json"), encoding="utf-8") as f:
+        frames = json.load(f)["frames"]
+    assert len(frames) >= 12, f"{len(frames)} frames"
+    # On a machine too busy for a frame a second a frame may meet another's light: that is said, and
+    # such a frame cannot be judged.
+    in_step = [f for f in frames if f["is_in_step"]]
+    assert len(in_step) >= 4, f"{len(in_step)} of {len(frames)} frames in step"
+    for frame in frames:
+        where = f"{frame['sequence']} {frame['frame']}"
+        assert frame["outcome"] == "result", f"{where}: {frame['outcome']}"
+    for frame in in_step:
+        where = f"{frame['sequence']} {frame['frame']}"
+        assert frame.get("same_as_gnomon_render", True), f"{where}: daemon and gnomon-render differ"
+        for part, error in frame["error"].items():
+            # Interactive quality is judged by its figures; this only sees a picture gone wrong.
+            assert error["composite"] < 0.5 * error["untouched"], f"{where}: {part} {error}"
+    assert os.path.getsize(os.path.join(out, "contact-sheet.png")) > 100000
+    assert "contact sheet" in text and "--stay" in text
+
+
+def check_own(folder):
+    for name in ("0.png", "1.png", "view.json"):
+        assert os.path.exists(os.path.join(folder, "composites", name)), f"no composites/{name}"
+
+
+def is_free(port):
+    with socket.socket() as s:
+        s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            s.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def main():
+    root, build, rig = (os.path.abspath(a) for a in sys.argv[1:4])
+    path = ":".join(os.path.join(build, d) for d in ("server", "client"))
+    env = dict(os.environ, PATH=path + ":" + os.environ["PATH"])
+    blocks = [b for b in get_blocks(root) if b != "tests/run"]
+    assert "deploy/quickstart" in blocks and len(blocks) >= 3, blocks
+    print(f"1..{len(blocks)}")
+    with tempfile.TemporaryDirectory(prefix="gnomon-readme-") as folder:
+        prepare(rig, folder)
+        for n, block in enumerate(blocks, 1):
+            name = block.split("\n")[0]
+            if "gnomond " in block and not (is_free(7340) and is_free(7341)):
+                print(f"ok {n} - {name} # SKIP the default ports 7340 and 7341 are taken")
+                continue
+            try:
+                text = run(block, root if block.startswith("deploy/") else folder, env)
+                if block.startswith("deploy/"):
+                    check_quickstart(root, text)
+                elif "gnomon view" in block:
+                    check_own(folder)
+                elif "gnomon-render" in block:
+                    assert os.path.getsize(os.path.join(folder, "layers.exr")) > 0
+            except (AssertionError, OSError, RuntimeError, ValueError) as problem:
+                print(f"# {problem}\nnot ok {n} - {name}")
+                continue
+            print(f"ok {n} - {name}", flush=True)
+
+
+main()
