@@ -89,6 +89,8 @@ def collect(rig, render, rig_folder, out, name):
                 "environment_frame": FIRST[SEQUENCES.index(name)] + i,
                 "error": {k: errors[stem][k] for k in ("object", "shadow")},
                 "error_with_bounces": {k: bounced[stem][k] for k in ("object", "shadow")}}
+        item["is_in_step"] = (item["outcome"] == "result" and
+                              item["receipt"]["lighting_sequence"] == item["environment_frame"])
         if i in shown:
             item["same_as_gnomon_render"] = render_offline(
                 render, folder, sequence, frame, out, os.path.join(composites, stem + ".png"))
@@ -136,12 +138,12 @@ def main():
     shutil.rmtree(os.path.join(out, "offline"))
     print_table(frames)
     for f in frames:
-        if f["receipt"]["lighting_sequence"] != f["environment_frame"]:
+        if not f["is_in_step"]:
             print(f"note: {f['sequence']} {f['frame']} was lit by environment frame "
                   f"{f['receipt']['lighting_sequence']}, not its own {f['environment_frame']}")
-    differ = [f for f in frames if f.get("same_as_gnomon_render") is False]
-    for f in differ:
-        print(f"note: {f['sequence']} {f['frame']}: gnomon-render's composite differs from the daemon's")
+    for f in frames:
+        if f["is_in_step"] and f.get("same_as_gnomon_render") is False:
+            print(f"note: {f['sequence']} {f['frame']}: gnomon-render's composite is not the daemon's")
     print(f"composites    {out}/composites\ncontact sheet {sheet}\nreport        {out}/report.json")
 
 
