@@ -20,3 +20,11 @@ int64_t gn_clock_get_realtime_ns(void)
 {
     return get_ns(CLOCK_REALTIME);
 }
+
+double gn_clock_get_ms_between(int64_t from_ns, int64_t to_ns)
+{
+    int64_t difference_ns;
+    if (!__builtin_sub_overflow(to_ns, from_ns, &difference_ns))
+        return (double)difference_ns * 1e-6;
+    return ((double)to_ns - (double)from_ns) * 1e-6;
+}

@@ -20,4 +20,10 @@ int64_t gn_clock_get_monotonic_ns(void);
 /** Nanoseconds since 1970 UTC; may jump. Thread-safety: safe. */
 int64_t gn_clock_get_realtime_ns(void);
 
+/**
+ * Milliseconds from one time to another; negative where to is the earlier. Any two values may be
+ * given, also those that a peer made up: nothing overflows. Thread-safety: safe.
+ */
+double gn_clock_get_ms_between(int64_t from_ns, int64_t to_ns);
+
 #endif

@@ -11,21 +11,9 @@
 
 /** What one room is sampled into, and its label. */
 struct sample {
-    char label[160]; // room="NAME", escaped
+    char label[80]; // room="NAME"; a room's name holds nothing to escape
     struct gn_room_figures figures;
 };
-
-/** A label's value: backslash, quote and line feed are escaped. */
-static void make_label(char out[static 160], const char *room)
-{
-    char *at = out + sprintf(out, "room=\"");
-    for (; *room; room++) {
-        if (*room == '\\' || *room == '"')
-            *at++ = '\\';
-        *at++ = *room == '\n' ? ' ' : *room;
-    }
-    strcpy(at, "\"");
-}
 
 static void put_head(FILE *out, const char *name, const char *type, const char *help)
 {
@@ -56,7 +44,9 @@ GETTER(n_lights)
 
 static double get_light_age_s(const struct gn_room_figures *f)
 {
-    return f->has_light ? (double)(gn_clock_get_monotonic_ns() - f->light_capture_ns) * 1e-9 : -1;
+    if (!f->has_light)
+        return -1;
+    return 1e-3 * gn_clock_get_ms_between(f->light_capture_ns, gn_clock_get_monotonic_ns());
 }
 
 static const struct metric metrics[] = {
@@ -163,7 +153,8 @@ int gn_http_make_metrics(const struct gn_http_view *view, struct gn_document *ou
         return -ENOMEM;
     }
     for (int i = 0; i < n; i++) {
-        make_label(samples[i].label, gn_room_get_options(view->options.rooms[i])->name);
+        snprintf(samples[i].label, sizeof(samples[i].label), "room=\"%s\"",
+                 gn_room_get_options(view->options.rooms[i])->name);
         gn_room_get_figures(view->options.rooms[i], &samples[i].figures);
     }
     put_head(file, "gnomon_build_info", "gauge", "The server's version.");

@@ -206,7 +206,7 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     bool is_literal = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED;
     int64_t at = gn_clock_get_monotonic_ns();
     rc = gn_composite_image8(&layers, &b->background, &camera->response, is_literal,
-                            m->options->pool, &b->composite);
+                             m->options->pool, &b->composite);
     w->result->receipt.composite_ms += (float)lap(&at);
     return rc < 0 ? gn_error_set(error, rc, "the layers do not fit the picture") : 0;
 }
@@ -288,10 +288,10 @@ static enum gn_msg_drop_reason make_views(struct work *w, struct gn_error *error
 static void start_receipt(struct gn_msg_receipt *receipt, const struct gn_frame_job *job,
                           const struct gn_lighting_state *light, int64_t now_ns)
 {
-    receipt->queue_ms = (float)((double)(now_ns - job->received_ns) * 1e-6);
+    receipt->queue_ms = (float)gn_clock_get_ms_between(job->received_ns, now_ns);
     receipt->lighting_sequence = light->sequence;
     receipt->lighting_age_ms =
-        (float)((double)(job->frame.capture_time_ns - light->capture_time_ns) * 1e-6);
+        (float)gn_clock_get_ms_between(light->capture_time_ns, job->frame.capture_time_ns);
     receipt->estimated_error = -1;
     receipt->quality = job->frame.quality;
 }

@@ -67,7 +67,7 @@ void gn_room_get_statistics(struct gn_room *room, struct gn_msg_statistics *out_
     out_statistics->median_frame_ms = (float)f.latency_p50_ms;
     out_statistics->holdable_fps = (float)f.holdable_fps_viewer;
     out_statistics->lighting_age_ms =
-        f.has_light ? (float)((double)(now_ns - f.light_capture_ns) * 1e-6) : -1;
+        f.has_light ? (float)gn_clock_get_ms_between(f.light_capture_ns, now_ns) : -1;
 }
 
 int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_sessions, int cap)

@@ -88,6 +88,10 @@ static void test_clocks(void **unused)
     int64_t a_ns = gn_clock_get_monotonic_ns();
     int64_t b_ns = gn_clock_get_monotonic_ns();
     assert_true(a_ns > 0 && b_ns >= a_ns);
+    assert_true(gn_clock_get_ms_between(3000000, 1500000) == -1.5);
+    assert_true(gn_clock_get_ms_between(INT64_MAX - 2000000, INT64_MAX) == 2);
+    assert_true(gn_clock_get_ms_between(INT64_MIN, INT64_MAX) == 0x1p64 * 1e-6);
+    assert_true(gn_clock_get_ms_between(INT64_MAX, INT64_MIN) == -0x1p64 * 1e-6);
     assert_true(gn_clock_get_realtime_ns() > INT64_C(1700000000) * GN_NS_PER_S);
     assert_true(gn_thread_get_cpu_count() >= 1);
 }
