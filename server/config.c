@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/text.h"
+
 /** The path as the server opens it. */
 static int get_scene_path(const struct gn_options *o, const char *room, char out[static 4096],
                           struct gn_error *error)
@@ -45,8 +47,6 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
 {
     const struct gn_options *o = options;
     const char *room = gn_options_get_name(o, "room", i);
-    if (strlen(room) > 63)
-        return gn_error_set(out_error, -EINVAL, "[room %s]: a name has at most 63 bytes", room);
     int rc = get_scene_path(o, room, out_scene_path, out_error);
     if (rc < 0)
         return rc;
@@ -78,13 +78,24 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
     return 0;
 }
 
-void gn_config_get_net(const struct gn_options *options, struct gn_net_options *out_net)
+int gn_config_get_net(const struct gn_options *options, struct gn_net_options *out_net,
+                      struct gn_error *out_error)
 {
     const struct gn_options *o = options;
+    const char *name = gn_options_get_string(o, "server", NULL, "name");
+    char clean[64]; // as messages and documents can hold it
+    snprintf(clean, sizeof(clean), "%s", name);
+    gn_text_clean(clean);
+    if (!name[0] || strcmp(clean, name) != 0)
+        return gn_error_set(out_error, -EINVAL,
+                            "[server] name = %s: 1 to 63 bytes of UTF-8 without control "
+                            "characters are right",
+                            clean);
     out_net->address = gn_options_get_address(o, "server", NULL, "listen");
     out_net->server_name = gn_options_get_string(o, "server", NULL, "name");
     out_net->max_connections = gn_options_get_int(o, "server", NULL, "max-connections");
     out_net->hello_timeout_ms = gn_options_get_int(o, "server", NULL, "hello-timeout-ms");
     out_net->idle_timeout_ms = gn_options_get_int(o, "server", NULL, "idle-timeout-ms");
     out_net->stall_timeout_ms = gn_options_get_int(o, "server", NULL, "stall-timeout-ms");
+    return 0;
 }

@@ -64,8 +64,9 @@ static void get_transport(void *context, struct gn_transport_figures *out_figure
 static int start_doors(struct server *s, struct gn_error *error)
 {
     struct gn_net_options net = {.rooms = s->rooms, .n_rooms = s->n_rooms, .mailbox = s->mailbox};
-    gn_config_get_net(s->options, &net);
-    int rc = gn_net_create(&net, &s->net, error);
+    int rc = gn_config_get_net(s->options, &net, error);
+    if (rc == 0)
+        rc = gn_net_create(&net, &s->net, error);
     if (rc < 0)
         return rc;
     const struct gn_http_options http = {

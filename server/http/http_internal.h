@@ -31,7 +31,8 @@ struct gn_http_view {
 
 /** JSON of everything. Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_http_make_status(const struct gn_http_view *view, struct gn_document *out);
-/** JSON, and whether all rooms can render. Returns 0 or -ENOMEM. */
+/** JSON, and whether clients are served: not before the start is over, nor from the stop on.
+ * Whether a room has light is told, and does not count. Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_http_make_ready(const struct gn_http_view *view, bool *out_is_ready,
                                    struct gn_document *out);
 /** Prometheus text format 0.0.4. Returns 0 or -ENOMEM. */

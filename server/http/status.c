@@ -8,11 +8,12 @@
 #include <jansson.h>
 
 #include "common/clock.h"
+#include "common/text.h"
 #include "server/http/http_internal.h"
 
 static double get_ms_since(int64_t then_ns)
 {
-    return (double)(gn_clock_get_monotonic_ns() - then_ns) * 1e-6;
+    return gn_clock_get_ms_between(then_ns, gn_clock_get_monotonic_ns());
 }
 
 /** json_object_set_new() fails where value is NULL: out of memory is found once, at the end. */
@@ -151,10 +152,15 @@ static void add_value(void *context, const char *section, const char *name, cons
                       const char *value, const char *source)
 {
     struct config_list *c = context;
+    char *texts[] = {strdup(value), strdup(source)}; // they hold paths: any bytes
+    for (size_t i = 0; i < GN_ARRAY_LEN(texts) && texts[i]; i++)
+        gn_text_clean(texts[i]);
     append(c->list,
            json_pack("{s:s?, s:s?, s:s, s:s, s:s}", "section", section, "name", name, "key", key,
-                     "value", value, "source", source),
+                     "value", texts[0], "source", texts[1]),
            c->is_short);
+    free(texts[0]);
+    free(texts[1]);
 }
 
 static json_t *make_transport(const struct gn_http_view *view)
@@ -203,7 +209,9 @@ int gn_http_make_status(const struct gn_http_view *view, struct gn_document *out
 
 int gn_http_make_ready(const struct gn_http_view *view, bool *out_is_ready, struct gn_document *out)
 {
-    bool is_short = false, is_ready = view->options.n_rooms > 0;
+    bool is_short = false;
+    struct gn_transport_figures transport = {0};
+    view->options.get_transport(view->options.transport_context, &transport);
     json_t *rooms = json_array();
     for (int i = 0; i < view->options.n_rooms; i++) {
         struct gn_room_figures f;
@@ -215,6 +223,7 @@ int gn_http_make_ready(const struct gn_http_view *view, bool *out_is_ready, stru
                          f.n_real_triangles + f.n_virtual_triangles, "lit", f.has_light),
                &is_short);
     }
-    *out_is_ready = is_ready;
-    return finish(json_pack("{s:b, s:o}", "ready", is_ready, "rooms", rooms), is_short, out);
+    *out_is_ready = transport.is_serving;
+    return finish(json_pack("{s:b, s:o}", "ready", transport.is_serving, "rooms", rooms), is_short,
+                  out);
 }

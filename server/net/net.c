@@ -225,6 +225,8 @@ static void start_stopping(struct gn_net *net, int64_t now_ns)
     if (read(net->stop_fd, &count, sizeof(count)) < 0)
         return;
     net->is_stopping = true;
+    net->counted.is_serving = false;
+    net->accept_after_ns = 0;
     (void)epoll_ctl(net->epoll_fd, EPOLL_CTL_DEL, net->listen_fd, NULL);
     for (int i = 0; i < net->n_sessions; i++)
         gn_session_bye(net->sessions[i], GN_MSG_BYE_REASON_SHUTDOWN, "the server stops", now_ns);
@@ -321,6 +323,10 @@ static void run(void *context)
 
 int gn_net_start(struct gn_net *net)
 {
+    net->counted.is_serving = true;
+    gn_mutex_lock(&net->mu);
+    net->figures = net->counted; // before the thread has run: who is told of the start may ask
+    gn_mutex_unlock(&net->mu);
     return gn_thread_start(&net->thread, "gn-net", run, net);
 }
 

@@ -14,11 +14,17 @@
 
 GN_LOG_TOPIC("net");
 
-/** Bytes handed to the connection before the next message is: more would only be kept. */
+/** Bytes and messages handed to the connection before the next is: more would only be kept, out of
+ * the outbox's reach. */
 #define WRITE_AHEAD_BYTES ((size_t)64 << 10)
+#define WRITE_AHEAD_MESSAGES 16
+/** Messages read in one go. Their answers come by the mailbox only after it: what is read beyond
+ * the outbox's room would cost the session, and memory without bound before that. */
+#define READ_MESSAGES 32
 
-/** For lines that a peer can cause. */
+/** For lines that a peer can cause; who comes and goes does not hide who misbehaves. */
 static struct gn_log_limiter limiter;
+static struct gn_log_limiter arrivals = {.burst = 50, .interval_ns = 10 * GN_NS_PER_S};
 
 enum gn_session_action gn_session_get_action(enum gn_session_state state, enum gn_msg_role role,
                                              uint16_t type)
@@ -195,9 +201,10 @@ static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int6
     s->want_statistics = hello->want_statistics;
     gn_conn_set_max_payload(s->conn, answer.max_payload_bytes);
     put_note(s, note);
-    gn_log(GN_LOG_INFO, "%s: session %llu: %s in room %s as %s", s->peer, (unsigned long long)s->id,
-           hello->client_name, gn_room_get_options(s->room)->name,
-           s->role == GN_MSG_ROLE_PROBE ? "probe" : "viewer");
+    gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: %s in room %s as %s", s->peer,
+                   (unsigned long long)s->id, hello->client_name,
+                   gn_room_get_options(s->room)->name,
+                   s->role == GN_MSG_ROLE_PROBE ? "probe" : "viewer");
 }
 
 static void answer_ping(struct gn_session *s, const struct gn_msg_ping *ping, int64_t now_ns)
@@ -288,7 +295,8 @@ static void take_message(struct gn_session *s, const struct gn_conn_message *mes
         open_up(s, &m.hello, now_ns);
         break;
     case GN_SESSION_LEAVE:
-        gn_log(GN_LOG_INFO, "%s: session %llu: BYE", s->peer, (unsigned long long)s->id);
+        gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: BYE", s->peer,
+                       (unsigned long long)s->id);
         s->state = GN_SESSION_GONE;
         break;
     default:
@@ -305,8 +313,8 @@ static void end_of_reading(struct gn_session *s, int rc, int64_t now_ns)
     case -ECONNRESET:
     case -EPIPE:
     case -ETIMEDOUT:
-        gn_log(GN_LOG_INFO, "%s: session %llu: the peer is gone: %s", s->peer,
-               (unsigned long long)s->id, gn_conn_get_fault(s->conn));
+        gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: the peer is gone: %s", s->peer,
+                       (unsigned long long)s->id, gn_conn_get_fault(s->conn));
         s->state = GN_SESSION_GONE;
         break;
     default:
@@ -337,8 +345,9 @@ void gn_session_read(struct gn_session *session, int64_t now_ns)
         return;
     }
     size_t n_bytes = 0;
-    while (gn_session_wants_read(session) && session->state != GN_SESSION_CLOSING &&
-           n_bytes < GN_CONN_READ_BYTES) {
+    for (int i = 0; i < READ_MESSAGES && n_bytes < GN_CONN_READ_BYTES; i++) {
+        if (!gn_session_wants_read(session) || session->state == GN_SESSION_CLOSING)
+            break;
         struct gn_conn_message message;
         int rc = gn_conn_read(session->conn, &message);
         if (rc < 0) {
@@ -364,12 +373,12 @@ static bool send_next(struct gn_session *s)
         return false;
     if (note->type == GN_WIRE_PONG)
         note->body.pong.t3_ns = gn_clock_get_monotonic_ns();
-    struct gn_wire_fault fault;
+    struct gn_wire_fault fault = {0};
     size_t before = gn_conn_get_queued_bytes(s->conn);
     int rc = gn_conn_send(s->conn, note->type, &note->body, note->payload, &fault);
-    if (rc == -EDOM || rc == -EMSGSIZE) // ours to mend: a figure that the wire does not take
-        gn_log_limited(&limiter, GN_LOG_ERROR, "%s: session %llu: cannot send: %s", s->peer,
-                       (unsigned long long)s->id, fault.text);
+    if (rc < 0) // ours to mend: a figure that the wire does not take, or no memory
+        gn_log_limited(&limiter, GN_LOG_ERROR, "%s: session %llu: cannot send: %s: %s", s->peer,
+                       (unsigned long long)s->id, strerror(-rc), fault.text);
     if (rc == -EDOM && note->type == GN_WIRE_RESULT) {
         gn_note_set_dropped(note, note->body.result.id, GN_MSG_DROP_REASON_INTERNAL,
                             "the result could not be written as a message");
@@ -384,19 +393,20 @@ static bool send_next(struct gn_session *s)
 
 void gn_session_write(struct gn_session *session, int64_t now_ns)
 {
+    const struct gn_conn *conn = session->conn;
     int rc = 1;
     while (session->state != GN_SESSION_GONE) {
-        if (gn_conn_get_queued_bytes(session->conn) < WRITE_AHEAD_BYTES && send_next(session))
+        if (gn_conn_get_queued_bytes(conn) < WRITE_AHEAD_BYTES &&
+            gn_conn_get_queued_messages(conn) < WRITE_AHEAD_MESSAGES && send_next(session))
             continue;
-        size_t queued = gn_conn_get_queued_bytes(session->conn);
-        rc = queued ? gn_conn_flush(session->conn) : 1;
+        size_t before = gn_conn_get_queued_bytes(conn);
+        rc = gn_conn_flush(session->conn);
         if (rc < 0) {
             session->state = GN_SESSION_GONE;
             return;
         }
-        if (gn_conn_get_queued_bytes(session->conn) != session->queued_before || rc == 1)
+        if (gn_conn_get_queued_bytes(conn) < before)
             session->moved_ns = now_ns;
-        session->queued_before = gn_conn_get_queued_bytes(session->conn);
         if (rc == 0 || session->outbox.n_messages == 0)
             break;
     }

@@ -71,13 +71,12 @@ struct gn_session {
     struct gn_room *room;           // where OPEN
     struct gn_room_session *member; // where OPEN
     bool want_statistics;
-    bool is_shut;         // CLOSING: all is written and our side is shut
-    int64_t deadline_ns;  // HELLO: of the greeting; CLOSING: of the end
-    int64_t heard_ns;     // the last whole message
-    int64_t pinged_ns;    // the last PING since; 0: none
-    int64_t moved_ns;     // when the outbox last moved
-    uint32_t watched;     // epoll's events, as last set
-    size_t queued_before; // bytes that waited in the connection when it was last looked at
+    bool is_shut;        // CLOSING: all is written and our side is shut
+    int64_t deadline_ns; // HELLO: of the greeting; CLOSING: of the end
+    int64_t heard_ns;    // the last whole message
+    int64_t pinged_ns;   // the last PING since; 0: none
+    int64_t moved_ns;    // when the peer last took a byte, or there was nothing to take
+    uint32_t watched;    // epoll's events, as last set
 };
 
 /** Takes a connected, non-blocking socket; it is closed on failure too. */
@@ -86,7 +85,8 @@ GN_MUST_USE int gn_session_create(struct gn_session_host *host, int fd, const ch
 /** Leaves the room and closes. NULL-safe; nulls *session. */
 void gn_session_destroy(struct gn_session **session);
 
-/** The socket can be read: deals with what is there, up to GN_CONN_READ_BYTES. */
+/** The socket can be read: deals with what is there, up to GN_CONN_READ_BYTES
+ * and some messages. */
 void gn_session_read(struct gn_session *session, int64_t now_ns);
 /** Writes what waits, as far as the socket takes it. */
 void gn_session_write(struct gn_session *session, int64_t now_ns);

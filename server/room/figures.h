@@ -61,6 +61,7 @@ struct gn_session_figures {
 
 /** What the network side counts. */
 struct gn_transport_figures {
+    bool is_serving; // between the network's start and the first word of its stop
     int connections; // open now
     uint64_t accepted, refused_full, protocol_errors, timeouts, stalled;
     uint64_t bytes_in, bytes_out;

@@ -96,6 +96,36 @@ def test_help_and_example():
         assert by_key[('server', 'listen')]['source'] == 'command line'
 
 
+def check_metrics(text):
+    """Prometheus text format 0.0.4: one HELP, one TYPE, then all samples of a name, each once."""
+    kind, seen, last = {}, {}, None
+    assert text.endswith('\n')
+    for line in text.splitlines():
+        word = line.split(' ')
+        if line.startswith('#'):
+            assert word[1] in ('HELP', 'TYPE') and len(word) >= 4, line
+            if word[1] == 'TYPE':
+                assert last == ('HELP', word[2]) and word[2] not in kind, line
+                assert word[3] in ('counter', 'gauge', 'histogram') and len(word) == 4, line
+                assert (word[3] == 'counter') == word[2].endswith('_total'), line
+                kind[word[2]] = word[3]
+            last = (word[1], word[2])
+            continue
+        match = re.match(r'([a-z_]+)(?:\{((?:[a-z]+="(?:[^"\\\n]|\\[\\"n])*",?)*)\})? (\S+)$', line)
+        assert match, line
+        name, labels, value = match.groups()
+        family = re.sub('_(bucket|sum|count)$', '', name)
+        family = family if kind.get(family) == 'histogram' else name
+        assert last == ('TYPE', family) and (name, labels) not in seen, line
+        seen[name, labels] = float(value)
+        assert kind[family] == 'gauge' or seen[name, labels] >= 0, line
+    for family in (name for name in kind if kind[name] == 'histogram'):
+        counts = [v for (name, _), v in seen.items() if name == family + '_bucket']
+        total = [v for (name, _), v in seen.items() if name == family + '_count']
+        assert counts == sorted(counts) and counts[-1:] == total, family
+    assert len(seen) > len(kind) > 20
+
+
 def test_page_and_documents():
     with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
         status, page, headers = daemon.get('/')
@@ -123,11 +153,23 @@ def test_page_and_documents():
         assert room['light']['lit'] and room['light']['lights'] > 0
         status, text, headers = daemon.get('/metrics')
         assert 'version=0.0.4' in headers['Content-Type']
+        check_metrics(text.decode())
         metrics = dict(re.findall(r'(?m)^([a-z_]+(?:\{[^}]*\})?) (\S+)$', text.decode()))
         assert metrics['gnomon_frames_rendered_total{room="demo"}'] == '2', metrics
         assert metrics['gnomon_frame_busy_seconds_count{room="demo"}'] == '2'
-        for line in text.decode().splitlines():
-            assert re.match(r'# (HELP|TYPE) |[a-z_]+(\{[^}]*\})? -?[0-9.e+-]+$', line), line
+
+
+def test_bytes():
+    """A path may hold any bytes, the server's name may not: it goes out in messages."""
+    room = Room()
+    os.rename(os.path.join(room.path, 'scene.json'), os.fsencode(room.path) + b'/sc\xffene.json')
+    with open(room.config, 'wb') as out:
+        out.write(b'[room demo]\nscene = sc\xffene.json\n')
+    with Daemon(rooms=room) as daemon:
+        values = json.loads(daemon.get('/api/v1/status')[1])['configuration']
+        assert [v['value'] for v in values if v['key'] == 'scene'] == ['sc?ene.json']
+    refuse(Room(), 'name = g?n', '63 bytes', arguments=[b'--server-name', b'g\xffn'])
+    refuse(Room(server='name = ' + 'x' * 64), 'name', '63 bytes')
 
 
 def test_names():
@@ -142,4 +184,4 @@ def test_names():
 
 
 run_tests([test_scenes, test_configuration, test_addresses, test_ready_file, test_help_and_example,
-           test_page_and_documents, test_names])
+           test_page_and_documents, test_bytes, test_names])
