@@ -48,7 +48,7 @@ const char *gn_wire_get_drop_text(enum gn_msg_drop_reason reason)
     case GN_MSG_DROP_REASON_SUPERSEDED:
         return "a newer frame of the session came before this one was started";
     case GN_MSG_DROP_REASON_OVERLOAD:
-        return "more frames were outstanding than WELCOME granted";
+        return "the connection takes results more slowly than they are made";
     case GN_MSG_DROP_REASON_LATE:
         return "its deadline had passed before it could be rendered or sent";
     case GN_MSG_DROP_REASON_NO_CAMERA:

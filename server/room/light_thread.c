@@ -13,27 +13,76 @@
 
 GN_LOG_TOPIC("room");
 
-/** Nobody needs light: a frame may rest in its slot until somebody comes. */
-static bool is_light_wanted_locked(const struct gn_room *room)
+/** Sessions that a lighting state goes to, and whether any wants its map. */
+struct subscribers {
+    uint64_t ids[GN_ROOM_MAX_SUBSCRIBERS];
+    bool want_map[GN_ROOM_MAX_SUBSCRIBERS];
+    int n;
+    bool any_map, any_plain;
+};
+
+/** What there is to do. */
+struct work {
+    bool has_job;
+    struct gn_environment_job job;   // where has_job
+    struct subscribers newcomers;    // who has not been sent the state that is there
+    struct gn_lighting_state *light; // a reference where newcomers.n > 0
+};
+
+/**
+ * A frame rests in its slot while nobody needs light. But until light was made from one frame of a
+ * probe, its frames are worked on: it is told what is wrong with them though nobody looks.
+ */
+static bool is_frame_due_locked(struct gn_room *room) GN_REQUIRES(room->mu)
 {
-    return room->n_viewers > 0 || room->n_subscribers > 0 ||
-           (room->light_asked_ns > 0 &&
-            gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS);
+    if (!room->has_environment)
+        return false;
+    if (room->n_viewers > 0 || room->n_subscribers > 0)
+        return true;
+    if (room->light_asked_ns > 0 &&
+        gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS)
+        return true;
+    const struct gn_room_session *probe = gn_room_find_locked(room, room->environment.session_id);
+    return probe && !probe->has_lit;
 }
 
-/** Waits for a frame that is wanted. False: the room stops. */
-static bool wait_for_frame(struct gn_room *room, struct gn_environment_job *out_job)
+/** Lists all subscribers, or those that were told nothing yet; counts them as told. */
+static void take_subscribers_locked(struct gn_room *room, bool newcomers_only,
+                                    struct subscribers *out) GN_REQUIRES(room->mu)
 {
+    memset(out, 0, sizeof(*out));
+    for (struct gn_room_session *s = room->sessions; s; s = s->next) {
+        if (!s->want_lighting_states || (newcomers_only && s->was_told))
+            continue;
+        s->was_told = true;
+        out->ids[out->n] = s->id;
+        out->want_map[out->n++] = s->want_lighting_maps;
+        out->any_map = out->any_map || s->want_lighting_maps;
+        out->any_plain = out->any_plain || !s->want_lighting_maps;
+    }
+}
+
+/** Waits for something to do. False: the room stops. */
+static bool wait_for_work(struct gn_room *room, struct work *out)
+{
+    memset(out, 0, sizeof(*out));
     gn_mutex_lock(&room->mu);
-    while (!room->is_stopping && !(room->has_environment && is_light_wanted_locked(room)))
+    while (!room->is_stopping) {
+        if (room->light)
+            take_subscribers_locked(room, true, &out->newcomers);
+        if (out->newcomers.n > 0)
+            out->light = gn_lighting_state_ref(room->light);
+        out->has_job = is_frame_due_locked(room);
+        if (out->has_job) {
+            out->job = room->environment;
+            room->has_environment = false;
+        }
+        if (out->has_job || out->light)
+            break;
         gn_cond_wait(&room->light_wake, &room->mu);
-    bool is_there = !room->is_stopping;
-    if (is_there) {
-        *out_job = room->environment;
-        room->has_environment = false;
     }
     gn_mutex_unlock(&room->mu);
-    return is_there;
+    return out->has_job || out->light;
 }
 
 /** Tells the probe what is wrong with its frame. */
@@ -43,8 +92,11 @@ static void refuse(struct gn_room *room, const struct gn_environment_job *job, i
     gn_mutex_lock(&room->mu);
     room->figures.environment_refused++;
     gn_mutex_unlock(&room->mu);
-    gn_log(GN_LOG_DEBUG, "room %s: session %llu: environment frame %llu refused: %s", room->name,
-           (unsigned long long)job->session_id, (unsigned long long)job->frame.sequence, sentence);
+    static struct gn_log_limiter limiter = {.burst = 50, .interval_ns = GN_NS_PER_S};
+    gn_log_limited(&limiter, GN_LOG_DEBUG,
+                   "room %s: session %llu: environment frame %llu refused: %s", room->name,
+                   (unsigned long long)job->session_id, (unsigned long long)job->frame.sequence,
+                   sentence);
     struct gn_note *note;
     if (gn_mailbox_get_blank(room->options.mailbox, &note) < 0)
         return;
@@ -53,27 +105,6 @@ static void refuse(struct gn_room *room, const struct gn_environment_job *job, i
                       code == -ENOMEM ? GN_MSG_ERROR_CODE_INTERNAL : GN_MSG_ERROR_CODE_BAD_VALUE,
                       GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, sentence);
     gn_mailbox_post(room->options.mailbox, note);
-}
-
-/** Who wants the state, and whether any wants its map. */
-struct subscribers {
-    uint64_t ids[GN_ROOM_MAX_SUBSCRIBERS];
-    bool want_map[GN_ROOM_MAX_SUBSCRIBERS];
-    int n;
-    bool any_map, any_plain;
-};
-
-static void list_subscribers_locked(const struct gn_room *room, struct subscribers *out)
-{
-    memset(out, 0, sizeof(*out));
-    for (const struct gn_room_session *s = room->sessions; s; s = s->next) {
-        if (!s->want_lighting_states || out->n == GN_ROOM_MAX_SUBSCRIBERS)
-            continue;
-        out->ids[out->n] = s->id;
-        out->want_map[out->n++] = s->want_lighting_maps;
-        out->any_map = out->any_map || s->want_lighting_maps;
-        out->any_plain = out->any_plain || !s->want_lighting_maps;
-    }
 }
 
 static void tell_subscribers(struct gn_room *room, const struct gn_lighting_state *state,
@@ -108,7 +139,8 @@ static void tell_subscribers(struct gn_room *room, const struct gn_lighting_stat
 }
 
 /** Makes the state the room's; takes the reference. */
-static void publish(struct gn_room *room, struct gn_lighting_state *state, double ms_decode)
+static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
+                    double ms_decode)
 {
     struct subscribers subscribers;
     struct gn_lighting_state *mine = gn_lighting_state_ref(state);
@@ -125,7 +157,10 @@ static void publish(struct gn_room *room, struct gn_lighting_state *state, doubl
     f->light_ms_map = mine->ms_map;
     f->light_ms_sh = mine->ms_sh;
     f->light_ms_lights = mine->ms_lights;
-    list_subscribers_locked(room, &subscribers);
+    struct gn_room_session *probe = gn_room_find_locked(room, probe_id);
+    if (probe)
+        probe->has_lit = true;
+    take_subscribers_locked(room, false, &subscribers);
     gn_cond_signal(&room->render_wake);
     gn_mutex_unlock(&room->mu);
     gn_lighting_state_unref(&old);
@@ -134,33 +169,45 @@ static void publish(struct gn_room *room, struct gn_lighting_state *state, doubl
     gn_lighting_state_unref(&mine);
 }
 
+/** From one frame to the room's light. *previous: the last state made, whose tables are used again;
+ * the new one takes its place. */
+static void make_light(struct gn_room *room, struct gn_environment_decoder *decoder,
+                       struct gn_environment_job *job, struct gn_lighting_state **previous)
+{
+    struct gn_error error = {0};
+    struct gn_environment_frame frame;
+    struct gn_lighting_state *state = NULL;
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    int rc = decoder ? gn_environment_decode(decoder, &job->frame, job->payload, &frame, &error)
+                     : gn_error_set(&error, -ENOMEM, "out of memory");
+    double ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
+    struct gn_light_options options = room->options.light;
+    options.previous = *previous;
+    if (rc == 0)
+        rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
+                                      &state, &error);
+    if (rc < 0) {
+        refuse(room, job, rc, error.text);
+    } else {
+        gn_lighting_state_unref(previous);
+        *previous = gn_lighting_state_ref(state);
+        publish(room, job->session_id, state, ms_decode);
+    }
+    gn_buf_unref(&job->payload);
+}
+
 void gn_room_run_light(void *context)
 {
     struct gn_room *room = context;
     struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
-    struct gn_lighting_state *previous = NULL; // whose tables the next of the stream uses again
-    struct gn_environment_job job;
-    while (wait_for_frame(room, &job)) {
-        struct gn_error error = {0};
-        struct gn_environment_frame frame;
-        struct gn_lighting_state *state = NULL;
-        int64_t start_ns = gn_clock_get_monotonic_ns();
-        int rc = decoder ? gn_environment_decode(decoder, &job.frame, job.payload, &frame, &error)
-                         : gn_error_set(&error, -ENOMEM, "out of memory");
-        double ms_decode = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
-        struct gn_light_options options = room->options.light;
-        options.previous = previous;
-        if (rc == 0)
-            rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
-                                          &state, &error);
-        if (rc < 0) {
-            refuse(room, &job, rc, error.text);
-        } else {
-            gn_lighting_state_unref(&previous);
-            previous = gn_lighting_state_ref(state);
-            publish(room, state, ms_decode);
-        }
-        gn_buf_unref(&job.payload);
+    struct gn_lighting_state *previous = NULL;
+    struct work work;
+    while (wait_for_work(room, &work)) {
+        if (work.light)
+            tell_subscribers(room, work.light, &work.newcomers);
+        gn_lighting_state_unref(&work.light);
+        if (work.has_job)
+            make_light(room, decoder, &work.job, &previous);
     }
     gn_lighting_state_unref(&previous);
     if (decoder)

@@ -146,9 +146,11 @@ int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
     snprintf(s->figures.peer, sizeof(s->figures.peer), "%s", member->peer);
 
     gn_mutex_lock(&room->mu);
-    if (s->role == GN_MSG_ROLE_VIEWER)
+    bool has_subscribers =
+        s->want_lighting_states && room->n_subscribers == GN_ROOM_MAX_SUBSCRIBERS;
+    if (s->role == GN_MSG_ROLE_VIEWER && !has_subscribers)
         s->slot = gn_scheduler_add(room->scheduler);
-    bool is_full = s->role == GN_MSG_ROLE_VIEWER && s->slot < 0;
+    bool is_full = has_subscribers || (s->role == GN_MSG_ROLE_VIEWER && s->slot < 0);
     if (!is_full) {
         s->next = room->sessions;
         room->sessions = s;
@@ -160,8 +162,9 @@ int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
     gn_mutex_unlock(&room->mu);
     if (is_full) {
         free(s);
-        return gn_error_set(out_error, -EUSERS, "room %s has its %d viewers", room->name,
-                            GN_ROOM_MAX_VIEWERS);
+        return gn_error_set(out_error, -EUSERS, "room %s has its %d %s", room->name,
+                            has_subscribers ? GN_ROOM_MAX_SUBSCRIBERS : GN_ROOM_MAX_VIEWERS,
+                            has_subscribers ? "subscribers of lighting states" : "viewers");
     }
     *out_session = s;
     return 0;
@@ -203,8 +206,10 @@ void gn_room_drop(struct gn_room *room, struct gn_frame_job *job, enum gn_msg_dr
     if (s)
         s->figures.frames_dropped++;
     gn_mutex_unlock(&room->mu);
-    gn_log(GN_LOG_DEBUG, "room %s: session %llu: frame %llu dropped: %s", room->name,
-           (unsigned long long)session_id, (unsigned long long)job->frame.id, sentence);
+    static struct gn_log_limiter limiter = {.burst = 50, .interval_ns = GN_NS_PER_S};
+    gn_log_limited(&limiter, GN_LOG_DEBUG, "room %s: session %llu: frame %llu dropped: %s",
+                   room->name, (unsigned long long)session_id, (unsigned long long)job->frame.id,
+                   sentence);
     gn_note_set_dropped(job->answer, job->frame.id, reason, sentence);
     gn_buf_unref(&job->payload);
     gn_mailbox_post(room->options.mailbox, job->answer);
@@ -225,7 +230,7 @@ static enum gn_msg_drop_reason prepare_job(const struct gn_room_session *s,
     if (frame->quality == GN_MSG_QUALITY_REFERENCE && s->room->options.refuse_reference) {
         gn_error_set(error, 0,
                      "room %s renders no frames of reference quality "
-                     "(its allow_reference is no)",
+                     "(its allow-reference is false)",
                      s->room->name);
         return GN_MSG_DROP_REASON_UNSUPPORTED;
     }

@@ -16,7 +16,7 @@
 /** Somebody who looked at a picture this recently wants the next one. */
 #define GN_ROOM_LOOK_NS (5 * GN_NS_PER_S)
 
-/** Most sessions of a room that get lighting states. */
+/** Most sessions of a room that get lighting states; one more is not let in. */
 #define GN_ROOM_MAX_SUBSCRIBERS 64
 
 /** An environment frame as it waits. */
@@ -41,6 +41,8 @@ struct gn_room_session {
     struct gn_pose world_from_camera;
     uint64_t last_frame_id, last_environment_sequence;
 
+    bool has_lit;  // guarded by room->mu: light was made from one of its environment frames
+    bool was_told; // guarded by room->mu: it was sent a lighting state, or is about to be
     struct gn_session_figures figures; // guarded by room->mu
 };
 

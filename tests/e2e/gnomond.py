@@ -177,15 +177,17 @@ class Client:
         return bytes(data)
 
     def receive(self):
-        magic, _, _, kind, _, n_header, n_payload = ENVELOPE.unpack(self.read(20))
-        assert magic == b'GNOM', magic
-        message = MESSAGES[kind]()
-        message.ParseFromString(self.read(n_header))
-        payload = self.read(n_payload)
-        if kind == PING:
+        start = time.monotonic()
+        while True:
+            magic, _, _, kind, _, n_header, n_payload = ENVELOPE.unpack(self.read(20))
+            assert magic == b'GNOM', magic
+            message = MESSAGES[kind]()
+            message.ParseFromString(self.read(n_header))
+            payload = self.read(n_payload)
+            if kind != PING:
+                return kind, message, payload
+            assert time.monotonic() - start < self.socket.gettimeout(), 'nothing but PING'
             self.send(PONG, pb.Pong(t1_ns=message.t1_ns))
-            return self.receive()
-        return kind, message, payload
 
     def expect(self, kind):
         got, message, payload = self.receive()

@@ -76,6 +76,48 @@ def test_one_outstanding_loses_nothing():
             viewer.expect_result(viewer.send_frame())
 
 
+def test_slow_reader():
+    """A peer that reads late, but within stall-timeout-ms, gets every answer, each id once."""
+    n = 50000
+    with Daemon() as daemon, Viewer(daemon) as viewer:
+        header = [pb.Frame(id=i, views=[pb.FrameView(camera=3)]).SerializeToString()
+                  for i in range(1, n + 1)]
+        data = b''.join(envelope(FRAME, len(h), 0) + h for h in header)
+        sender = threading.Thread(target=viewer.send_bytes, args=[data], daemon=True)
+        sender.start()
+        time.sleep(1.5)  # long enough to fill the socket's buffers, and what the daemon keeps
+        for i in range(1, n + 1):
+            viewer.expect_dropped(i, pb.DROP_REASON_NO_CAMERA)
+        sender.join()
+
+
+def test_told_at_once():
+    """A probe that nobody looks at is told of its bad frame; a late subscriber gets the state."""
+    with Daemon(server='max-connections = 80') as daemon, probe(daemon) as light:
+        light_up(light, 1, pixel_format=pb.PIXEL_FORMAT_JPEG, pixels=b'\xff\xd8 no')
+        error, _ = light.expect(ERROR)
+        assert error.about_type == ENVIRONMENT_FRAME and error.about_id == 1 and not error.fatal
+        light_up(light, 2)
+        with Viewer(daemon, want_lighting_states=True) as viewer, \
+                probe(daemon, want_lighting_maps=True) as other:
+            state, payload = viewer.expect(LIGHTING_STATE)
+            assert state.sequence == 2 and len(payload) == 32 * state.light_count > 0
+            state, payload = other.expect(LIGHTING_STATE)
+            assert state.sequence == 2 and state.map_width == 512
+            light_up(light, 3)
+            assert viewer.expect(LIGHTING_STATE)[0].sequence == 3
+        clients = []
+        for _ in range(64):
+            clients.append(Client(daemon, pb.ROLE_PROBE, want_lighting_states=True))
+            clients[-1].expect(LIGHTING_STATE)
+        with Client(daemon) as more:
+            more.send(HELLO, pb.Hello(version_min=1, version_max=1, role=pb.ROLE_PROBE,
+                                      want_lighting_states=True))
+            assert '64 subscribers' in more.expect_fatal(pb.ERROR_CODE_FULL)
+        for client in clients:
+            client.close()
+
+
 def test_waiting_for_light():
     with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as patient, \
             Viewer(daemon) as other:
@@ -209,12 +251,18 @@ def test_no_work_without_need():
     """Light is not made for a room where nobody wants it, and is made when somebody comes."""
     import json
     with Daemon() as daemon, probe(daemon) as light:
+        def get_light():
+            return json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['light']
+        light_up(light, 4)  # the first of a probe is always worked on
+        deadline = time.monotonic() + 20
+        while not get_light()['lit'] and time.monotonic() < deadline:
+            time.sleep(0.01)
         light_up(light, 5)
         light.send(PING, pb.Ping(t1_ns=1))
         light.expect(PONG)
         time.sleep(0.2)
-        room = json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]
-        assert room['light'] == {'lit': False, 'environment_frame_waiting': True}, room['light']
+        lit = get_light()
+        assert (lit['sequence'], lit['environment_frame_waiting']) == (4, True), lit
         with Viewer(daemon) as viewer:
             frame_id = viewer.send_frame(lighting_min_sequence=5, lighting_wait_ms=20000)
             viewer.expect_result(frame_id)
@@ -231,11 +279,15 @@ def test_shutdown():
         daemon.process.send_signal(signal.SIGTERM)
         bye, _ = viewer.expect(BYE)
         assert bye.reason == pb.BYE_REASON_SHUTDOWN
+        try:  # while the last are still being told, nobody new is sent here
+            assert daemon.get('/readyz')[0] == 503
+        except OSError:
+            pass
         viewer.expect_closed()
         daemon.stop()
         assert time.monotonic() - start < 15
 
 
 run_tests([test_composite_and_receipt, test_each_id_once, test_one_outstanding_loses_nothing,
-           test_waiting_for_light, test_reasons, test_views_and_jpeg, test_environment_formats,
+           test_slow_reader, test_told_at_once, test_waiting_for_light, test_reasons, test_views_and_jpeg, test_environment_formats,
            test_statistics, test_no_work_without_need, test_shutdown])
