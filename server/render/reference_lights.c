@@ -3,12 +3,12 @@
 /*
  * The reference's directions: the whole map, which is taken as constant over each texel, as it was
  * measured. A texel of radiance L is one light of direction and irradiance L m, where
- *   m = integral of the direction d over the texel = 1/2 sum over its edges angle e / |e|, e = a x
- * b from corner a to corner b (Lambert's formula for the irradiance of a polygon, here on the
- * sphere). Neighbours share edges, so under a constant map the texels of a hemisphere add up to pi
- * exactly. One that holds much of all energy is a lamp, and one direction would give it a hard
- * shadow: it is cut into parts that share its irradiance evenly. What the map does not show has the
- * fill's radiance, on rings of equal solid angle that begin at its rim.
+ *   m = integral of the direction over the texel = 1/2 sum over its edges: angle e / |e|
+ * with e = a x b of an edge from a to b (Lambert's formula for the irradiance from a polygon, here
+ * on the sphere). Neighbours share edges, so under a constant map the texels of a hemisphere add up
+ * to pi exactly. A texel that holds much of all energy is a lamp, and one direction would give it a
+ * hard shadow: it is cut into parts. What the map does not show has the fill's radiance, on rings
+ * of equal solid angle that begin at its rim.
  */
 #include "server/render/internal.h"
 
@@ -57,15 +57,15 @@ static void add_edge(const double a[static 3], const double b[static 3], double 
         moment[k] += scale * e[k];
 }
 
-/** The texel's moment per solid angle, world. False where a corner is not shown, or where the
- * corners do not say how the texel lies (the rim that is one direction). */
-static bool get_moment(const struct gn_radiance_map *map, int x, int y, double out[static 3])
+/** The moment of the square [x, x + side] x [y, y + side] px, world. False where a corner is not
+ * shown. */
+static bool get_moment(const struct gn_radiance_map *map, double x, double y, double side,
+                       double out[static 3])
 {
     static const int corners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
-    size_t i = (size_t)y * (size_t)map->radiance.width + (size_t)x;
     bool is_fine = (int64_t)map->radiance.width * map->radiance.height >= FINE_TEXELS;
     int n_steps = is_fine ? 1 : EDGE_STEPS;
-    double moment[3] = {0};
+    double twice[3] = {0};
     double a[3];
     double b[3];
     if (!gn_projection_get_direction(&map->projection, x, y, a))
@@ -74,20 +74,16 @@ static bool get_moment(const struct gn_radiance_map *map, int x, int y, double o
         const int *from = corners[(j - 1) / n_steps];
         const int *to = corners[(j - 1) / n_steps + 1];
         double t = ((j - 1) % n_steps + 1.0) / n_steps;
-        if (!gn_projection_get_direction(&map->projection, x + from[0] + t * (to[0] - from[0]),
-                                         y + from[1] + t * (to[1] - from[1]), b))
+        if (!gn_projection_get_direction(&map->projection,
+                                         x + side * (from[0] + t * (to[0] - from[0])),
+                                         y + side * (from[1] + t * (to[1] - from[1])), b))
             return false;
-        add_edge(a, b, moment);
+        add_edge(a, b, twice);
         memcpy(a, b, sizeof(a));
     }
-    gn_pose_rotate(&map->world_from_probe, moment, moment);
-    const float *c = map->direction_world + 3 * i;
-    const double centre[3] = {c[0], c[1], c[2]};
-    double along = dot(moment, centre) / (2 * map->solid_angle[i]);
-    if (!(fabs(along) > 0.9 && fabs(along) < 1.01))
-        return false;
     for (int k = 0; k < 3; k++)
-        out[k] = copysign(0.5, along) * moment[k] / map->solid_angle[i];
+        twice[k] *= 0.5;
+    gn_pose_rotate(&map->world_from_probe, twice, out);
     return true;
 }
 
@@ -97,45 +93,58 @@ static int count_parts(const double irradiance[static 3], double total)
     return share > SHARE_4X4 ? 4 : share > SHARE_2X2 ? 2 : 1;
 }
 
-static void add_whole(const struct gn_radiance_map *map, int x, int y, double irradiance[static 3],
-                      struct light_list *list)
+/** Adds a part of a texel, or all of it: a square around `centre` (unit, world) that has a share of
+ * the texel's irradiance where its moment is not known or makes no sense (corners outside, a rim
+ * that is one direction). */
+static void add_part(const struct gn_radiance_map *map, size_t texel, const double corner[static 2],
+                     double side, const double centre[static 3], double solid_angle,
+                     struct light_list *list)
 {
-    double dir[3];
-    double length = 1;
-    if (get_moment(map, x, y, dir)) {
-        length = sqrt(dot(dir, dir));
-    } else {
-        size_t i = (size_t)y * (size_t)map->radiance.width + (size_t)x;
-        for (size_t k = 0; k < 3; k++)
-            dir[k] = map->direction_world[3 * i + k];
+    double dir[3] = {centre[0], centre[1], centre[2]};
+    double length = solid_angle;
+    double moment[3];
+    if (get_moment(map, corner[0], corner[1], side, moment)) {
+        double along = dot(moment, centre) / solid_angle; // < 0: the corners run the other way
+        if (fabs(along) > 0.1 && fabs(along) < 2) {
+            length = sqrt(dot(moment, moment));
+            for (int k = 0; k < 3; k++)
+                dir[k] = copysign(1, along) * moment[k] / length;
+        }
     }
-    for (int k = 0; k < 3; k++) {
-        dir[k] /= length;
-        irradiance[k] *= length;
-    }
+    double irradiance[3];
+    for (size_t k = 0; k < 3; k++)
+        irradiance[k] = length * (double)map->radiance.data[3 * texel + k];
     gn_render_lights_add(list, dir, irradiance);
 }
 
-static void add_parts(const struct gn_radiance_map *map, int x, int y, int n,
-                      double irradiance[static 3], struct light_list *list)
+/** Adds texel (x, y) in n x n parts, those that the map shows. */
+static void add_texel(const struct gn_radiance_map *map, int x, int y, int n,
+                      struct light_list *list)
 {
-    double dirs[16][3];
+    size_t texel = (size_t)y * (size_t)map->radiance.width + (size_t)x;
+    double centres[16][3];
+    double corners[16][2];
     int n_shown = 0;
-    for (int part = 0; part < n * n; part++) {
+    for (int part = 0; part < n * n && n > 1; part++) {
         int row = part / n;
+        const double corner[2] = {x + (double)(part % n) / n, y + (double)row / n};
         double dir[3];
-        if (gn_projection_get_direction(&map->projection, x + (part % n + 0.5) / n,
-                                        y + (row + 0.5) / n, dir))
-            gn_pose_rotate(&map->world_from_probe, dir, dirs[n_shown++]);
+        if (!gn_projection_get_direction(&map->projection, corner[0] + 0.5 / n, corner[1] + 0.5 / n,
+                                         dir))
+            continue;
+        memcpy(corners[n_shown], corner, sizeof(corner));
+        gn_pose_rotate(&map->world_from_probe, dir, centres[n_shown++]);
     }
     if (n_shown == 0) {
-        add_whole(map, x, y, irradiance, list);
-        return;
+        for (size_t k = 0; k < 3; k++)
+            centres[0][k] = map->direction_world[3 * texel + k];
+        corners[0][0] = x;
+        corners[0][1] = y;
+        n = n_shown = 1;
     }
-    for (int k = 0; k < 3; k++)
-        irradiance[k] /= n_shown;
     for (int part = 0; part < n_shown; part++)
-        gn_render_lights_add(list, dirs[part], irradiance);
+        add_part(map, texel, corners[part], 1.0 / n, centres[part],
+                 (double)map->solid_angle[texel] / n_shown, list);
 }
 
 /** The lights of a square of 4 x 4 texels, a block; or those of its texels that are cut, a block
@@ -154,9 +163,9 @@ static void add_square(const struct gn_radiance_map *map, int x0, int y0, double
             continue;
         int n = count_parts(irradiance, total);
         if (n == 1 && !is_cut) {
-            add_whole(map, x, y, irradiance, list);
+            add_texel(map, x, y, 1, list);
         } else if (n > 1 && is_cut) {
-            add_parts(map, x, y, n, irradiance, list);
+            add_texel(map, x, y, n, list);
             gn_render_lights_pad(list, LANES);
         }
     }

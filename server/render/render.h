@@ -83,7 +83,9 @@ struct gn_render_report {
     int n_lights;                           // lights used; reference: directions of the map used
     /**
      * Of the shadow factor, RMS over the affected pixels and channels; < 0: not known. Half the
-     * difference between the factors that the even and the odd lights give: as rough as that is.
+     * difference between the factors that the even and the odd lights give: as rough as that is:
+     * 3 to 5 times the true error for lights that each stand for a cell of the map, whose halves
+     * differ by more than samples would (tests/unit/render_reference.c prints both).
      */
     double estimated_error;
     int64_t n_virtual_pixels, n_shadow_pixels; // pixels with coverage > 0, with a factor < 1

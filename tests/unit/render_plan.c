@@ -158,6 +158,49 @@ static void test_omissions_change_nothing(void **state)
     }
 }
 
+/** Meshes of more triangles than clusters keep edges of, on and around each other. */
+static void test_fine_meshes_change_nothing(void **state)
+{
+    (void)state;
+    const double eye[3] = {0.5, -3, 2};
+    const double target[3] = {0, 0, 0.3};
+    const struct gn_render_options options = {.quality = GN_QUALITY_REFERENCE};
+    for (int fine = 0; fine < 2; fine++) {
+        struct gn_test_stage stage = {0};
+        gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_plane(6, 3), 0, 0, 0,
+                          GN_MATERIAL_DIFFUSE, grey);
+        gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_sphere(0.3f, fine ? 64 : 8), 0.6, 0.2,
+                          0.2, GN_MATERIAL_DIFFUSE, grey);
+        gn_test_stage_add(&stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.4f, fine ? 64 : 24), -0.1, 0,
+                          0.5, GN_MATERIAL_DIFFUSE, grey);
+        gn_test_stage_commit(&stage, 2);
+        gn_test_stage_set_map(&stage, 64, 32, paint_room, NULL);
+        gn_test_stage_aim(&stage, 23, 17, 20, eye, target);
+        check_omissions(&stage, options);
+        gn_test_stage_finish(&stage);
+    }
+}
+
+static void test_reference_asks_once_for_many_texels(void **state)
+{
+    (void)state;
+    struct gn_render_options options = {.quality = GN_QUALITY_REFERENCE, .all_passes = true};
+    struct gn_test_stage stage = {0};
+    init_stage(&stage, ALL_THINGS, 2);
+    gn_test_stage_set_map(&stage, 128, 64, paint_room, NULL);
+    gn_test_stage_aim(&stage, 16, 12, 14, (const double[3]){0.5, -3, 2},
+                      (const double[3]){0, 0, 0.3});
+    gn_test_stage_render(&stage, &options);
+    uint64_t all = stage.report.rays_shadow + stage.report.rays_shade;
+    options.all_passes = false;
+    gn_test_stage_render(&stage, &options);
+    uint64_t some = stage.report.rays_shadow + stage.report.rays_shade;
+    print_message("# reference: %llu of %llu rays\n", (unsigned long long)some,
+                  (unsigned long long)all);
+    assert_true(some > 0 && 4 * some < all);
+    gn_test_stage_finish(&stage);
+}
+
 static void test_culling_saves_rays(void **state)
 {
     (void)state;
@@ -344,6 +387,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_omissions_change_nothing),
+        cmocka_unit_test(test_fine_meshes_change_nothing),
+        cmocka_unit_test(test_reference_asks_once_for_many_texels),
         cmocka_unit_test(test_culling_saves_rays),
         cmocka_unit_test(test_every_reason),
         cmocka_unit_test(test_what_lies_outside_the_picture),

@@ -192,11 +192,33 @@ static void test_many_lights_tend_to_the_reference(void **state)
     gn_test_stage_finish(&stage);
 }
 
+static void test_a_coarse_constant_map_is_exact(void **state)
+{
+    (void)state;
+    // The horizon of z = 0 runs along the texels' edges: their moments add up to pi, however few.
+    struct gn_test_stage stage = {0};
+    const double eye[3] = {1, 2, 3};
+    const double target[3] = {0, 0, 0};
+    gn_test_stage_add(&stage, GN_RT_VIRTUAL, gn_test_make_plane(4, 2), 0, 0, 0, GN_MATERIAL_DIFFUSE,
+                      grey);
+    gn_test_stage_commit(&stage, 0);
+    gn_test_stage_aim(&stage, 9, 9, 90, eye, target);
+    const struct gn_render_options options = {.quality = GN_QUALITY_REFERENCE};
+    static const int widths[3] = {8, 32, 512};
+    for (int i = 0; i < 3; i++) {
+        gn_test_stage_set_map(&stage, widths[i], widths[i] / 2, paint_one, NULL);
+        gn_test_stage_render(&stage, &options);
+        assert_float_equal(gn_image_at(&stage.layers.virtual_rgba, 4, 4)[1], 0.5, 1e-5);
+    }
+    gn_test_stage_finish(&stage);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_adaptive_grid_is_as_good_as_a_full_one),
         cmocka_unit_test(test_edges_are_covered_by_their_area),
+        cmocka_unit_test(test_a_coarse_constant_map_is_exact),
         cmocka_unit_test(test_white_furnace),
         cmocka_unit_test(test_many_lights_tend_to_the_reference),
     };

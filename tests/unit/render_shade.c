@@ -254,9 +254,35 @@ static void test_distortion_moves_the_object_as_the_lens_does(void **state)
     gn_test_stage_finish(&stage);
 }
 
+static void test_depth_is_at_the_centre_of_the_pixel(void **state)
+{
+    (void)state;
+    // A floor seen aslant: half a pixel aside its depth differs by some parts in a thousand.
+    struct gn_test_stage stage = {0};
+    const double eye[3] = {1, 2, 3};
+    gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_plane(20, 1), 0, 0, 0, GN_MATERIAL_DIFFUSE,
+                      grey);
+    gn_test_stage_commit(&stage, 2);
+    gn_test_stage_set_map(&stage, 16, 8, paint_sky, NULL);
+    gn_test_stage_aim(&stage, 40, 30, 60, eye, origin);
+    gn_test_stage_render(&stage, NULL);
+    for (int y = 0; y < 30; y++) {
+        for (int x = 0; x < 40; x++) {
+            double p[3];
+            gn_test_stage_get_point(&stage, x + 0.5, y + 0.5, 0, p);
+            double along = 0; // the camera's z is from the eye to the origin
+            for (int k = 0; k < 3; k++)
+                along -= (p[k] - eye[k]) * eye[k] / sqrt(14);
+            assert_float_equal(*gn_image_at(&stage.layers.depth, x, y) / along, 1, 1e-5);
+        }
+    }
+    gn_test_stage_finish(&stage);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_depth_is_at_the_centre_of_the_pixel),
         cmocka_unit_test(test_constant_map_gives_albedo_times_radiance),
         cmocka_unit_test(test_real_and_virtual_objects_shade_virtual_ones),
         cmocka_unit_test(test_real_objects_hide_virtual_ones),
