@@ -12,45 +12,11 @@
 
 #include <cmocka.h>
 
+#include "tests/allocations.h"
 #include "tests/meshes.h"
 #include "tests/stage.h"
 
 static const float grey[3] = {0.5f, 0.4f, 0.3f};
-
-/* The linker puts these before the libc's for all our own code (--wrap). */
-static long n_allocations;
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *p, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *p, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-
-void *__wrap_malloc(size_t size)
-{
-    n_allocations++;
-    return __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t n, size_t size)
-{
-    n_allocations++;
-    return __real_calloc(n, size);
-}
-
-void *__wrap_realloc(void *p, size_t size)
-{
-    n_allocations++;
-    return __real_realloc(p, size);
-}
-
-void *__wrap_aligned_alloc(size_t alignment, size_t size)
-{
-    n_allocations++;
-    return __real_aligned_alloc(alignment, size);
-}
 
 static void paint_room(void *context, const double dir[static 3], float out_rgb[static 3])
 {
@@ -329,16 +295,16 @@ static void test_a_warm_frame_takes_no_memory(void **state)
     init_stage(&stage, ALL_THINGS, 2);
     for (int quality = 0; quality <= GN_QUALITY_REFERENCE; quality++) {
         const struct gn_render_options options = {.quality = (enum gn_quality)quality};
-        long before = n_allocations;
+        long before = gn_test_n_allocations;
         gn_test_stage_render(&stage, &options);
         if (quality == 0)
-            assert_true(n_allocations > before); // the counter works
-        before = n_allocations;
+            assert_true(gn_test_n_allocations > before); // the counter works
+        before = gn_test_n_allocations;
         for (int i = 0; i < 3; i++) {
             stage.camera.world_from_camera.translation[0] += 0.01;
             gn_test_stage_render(&stage, &options);
         }
-        assert_int_equal(n_allocations, before);
+        assert_int_equal(gn_test_n_allocations, before);
     }
     gn_test_stage_finish(&stage);
 }
