@@ -289,5 +289,6 @@ def test_shutdown():
 
 
 run_tests([test_composite_and_receipt, test_each_id_once, test_one_outstanding_loses_nothing,
-           test_slow_reader, test_told_at_once, test_waiting_for_light, test_reasons, test_views_and_jpeg, test_environment_formats,
-           test_statistics, test_no_work_without_need, test_shutdown])
+           test_slow_reader, test_told_at_once, test_waiting_for_light, test_reasons,
+           test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,
+           test_shutdown])

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the Gnomon authors
 # SPDX-License-Identifier: ISC
 """Bad input of every kind at every door, while a good probe and a good viewer lose nothing."""
+import json
 import os
 import random
 import struct
@@ -243,12 +244,16 @@ def test_idle():
         assert time.monotonic() - start < 10
 
 
+def get_network():
+    return json.loads(DAEMON.get('/api/v1/status')[1])['network']
+
+
 def test_reads_nothing():
     """A viewer that sends and does not read is closed; what it leaves costs nobody else."""
+    before = get_network()['stalled']
     client = Client(DAEMON, pb.ROLE_VIEWER)
-    client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    client.socket.settimeout(10)
-    start, frame_id, closed = time.monotonic(), 0, False
+    client.socket.settimeout(20)
+    start, frame_id = time.monotonic(), 0
     try:
         while time.monotonic() - start < 60:
             batch = b''
@@ -257,10 +262,10 @@ def test_reads_nothing():
                 header = pb.Frame(id=frame_id, views=[pb.FrameView()]).SerializeToString()
                 batch += envelope(FRAME, len(header), 0) + header
             client.send_bytes(batch)
-    except (ConnectionResetError, BrokenPipeError):
-        closed = True
+    except (ConnectionResetError, BrokenPipeError, TimeoutError):
+        pass  # where both systems' buffers are full, the end may not get through to this side
+    assert get_network()['stalled'] == before + 1, get_network()
     client.close()
-    assert closed, 'still served after %g s' % (time.monotonic() - start)
 
 
 def test_long_quiet():
