@@ -34,6 +34,7 @@ struct gn_rig_sequence_options {
     bool is_float;           // sequence.json names float frames, not log codes
     int bounces;             // [0, 8], of the pictures with bounces
     int paths;               // a pixel: 4 batches; a power of two, [8, 16384]
+    int direct_paths;        // the same for the pictures in direct light; 0: paths
     uint64_t seed;
     double noise;      // standard deviation of the sensor's noise, 8-bit codes; 0: none
     double jitter_mm;  // standard deviation of the delivered camera position, each axis

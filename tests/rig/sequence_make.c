@@ -73,10 +73,10 @@ static int make_key(struct maker *m, struct gn_error *error)
     uint64_t hash = 0xcbf29ce484222325u;
     int n =
         snprintf(text, sizeof(text),
-                 "%s %.17g %.17g %d %d %d %d %d %d %d %d %" PRIu64 " %.17g %.17g %.17g %d %d",
+                 "%s %.17g %.17g %d %d %d %d %d %d %d %d %d %" PRIu64 " %.17g %.17g %.17g %d %d",
                  RECIPE, o->turn_deg, o->light_distance, o->width, o->height, o->frames_per_light,
-                 o->probe_size, (int)o->probe, o->is_float, o->bounces, o->paths, o->seed, o->noise,
-                 o->jitter_mm, o->jitter_deg, o->is_distorted, o->is_smooth);
+                 o->probe_size, (int)o->probe, o->is_float, o->bounces, o->paths, o->direct_paths,
+                 o->seed, o->noise, o->jitter_mm, o->jitter_deg, o->is_distorted, o->is_smooth);
     hash = hash_bytes(hash, text, (size_t)n);
     if (strcmp(o->light, "lamps")) {
         uint8_t *data = NULL;
@@ -340,18 +340,46 @@ static bool is_done(const struct maker *m, int frame)
     return done;
 }
 
+/* All pictures of a frame; those in direct light from paths of their own where more are asked for.
+ */
+static int render_pictures(const struct maker *m, int frame, const struct gn_rig_view *view,
+                           struct gn_rig_pictures *out, struct gn_error *error)
+{
+    const struct gn_rig_environment *light = &m->lights[frame / m->o->frames_per_light];
+    struct gn_rig_render_options options = {.bounces = m->o->bounces,
+                                            .batches = BATCHES,
+                                            .batch_size = m->o->paths / BATCHES,
+                                            .seed = m->o->seed,
+                                            .frame = frame};
+    int result = gn_rig_render(&m->room, light, view, &options, m->pool, out, error);
+    if (result || !m->o->direct_paths || m->o->direct_paths == m->o->paths)
+        return result;
+    static const int direct[2] = {GN_RIG_BACKGROUND, GN_RIG_TRUTH};
+    struct gn_rig_pictures more;
+    options.bounces = 0;
+    options.batch_size = m->o->direct_paths / BATCHES;
+    result = gn_rig_render(&m->room, light, view, &options, m->pool, &more, error);
+    if (result) {
+        gn_rig_pictures_finish(out);
+        return result;
+    }
+    for (int i = 0; i < 2; i++) {
+        struct gn_image mean = out->mean[direct[i]], deviation = out->error[direct[i]];
+        out->mean[direct[i]] = more.mean[direct[i]];
+        out->error[direct[i]] = more.error[direct[i]];
+        more.mean[direct[i]] = mean;
+        more.error[direct[i]] = deviation;
+    }
+    gn_rig_pictures_finish(&more);
+    return 0;
+}
+
 static int render_frame(const struct maker *m, int frame, const struct gn_rig_view *view,
                         struct gn_error *error)
 {
-    const struct gn_rig_render_options options = {.bounces = m->o->bounces,
-                                                  .batches = BATCHES,
-                                                  .batch_size = m->o->paths / BATCHES,
-                                                  .seed = m->o->seed,
-                                                  .frame = frame};
     struct gn_rig_pictures pictures = {0};
     char path[PATH_MAX_BYTES];
-    int result = gn_rig_render(&m->room, &m->lights[frame / m->o->frames_per_light], view, &options,
-                               m->pool, &pictures, error);
+    int result = render_pictures(m, frame, view, &pictures, error);
     for (int i = 0; result == 0 && i < GN_RIG_PICTURES; i++)
         result = write_picture(m, frame, i, &pictures.mean[i], error);
     if (result == 0)

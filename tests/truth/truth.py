@@ -31,7 +31,7 @@ def run(*args):
 def make_sequence(rig, work, name, light, probe):
     folder = os.path.join(work, name)
     run(rig, "make", "--light", light, "--probe", probe, "--width", WIDTH, "--height", HEIGHT,
-        "--frames-per-light", 1, folder)
+        "--frames-per-light", 1, "--direct-paths", 512, folder)
     return folder
 
 
