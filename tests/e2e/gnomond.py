@@ -150,7 +150,7 @@ class Daemon:
 class Client:
     """A connection; with a role, an open session."""
 
-    def __init__(self, daemon, role=None, timeout=30, **hello):
+    def __init__(self, daemon, role=None, timeout=120, **hello):
         self.socket = socket.create_connection(daemon.address, timeout=timeout)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.last_id = 0
@@ -304,7 +304,7 @@ class Bystanders:
 
     def finish(self):
         before = self.n
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 120
         while self.n < before + 3 and not self.fault and time.monotonic() < deadline:
             time.sleep(0.01)
         self.is_over.set()
