@@ -79,6 +79,9 @@ def collect(rig, render, rig_folder, out, name):
     sequence = load(folder, "sequence.json")
     composites = os.path.join(out, "composites", name)
     view = {f["name"]: f for f in load(composites, "view.json")["frames"]}
+    for frame in view.values():
+        if frame["outcome"] != "result":
+            sys.exit(f"quickstart: {name} {frame['name']} was dropped: {frame['sentence']}")
     errors = judge(rig, folder, composites)
     bounced = judge(rig, os.path.join(folder, "bounces"), os.path.join(composites, "bounces"))
     shown = get_shown(len(sequence["frames"]))
@@ -89,8 +92,7 @@ def collect(rig, render, rig_folder, out, name):
                 "environment_frame": FIRST[SEQUENCES.index(name)] + i,
                 "error": {k: errors[stem][k] for k in ("object", "shadow")},
                 "error_with_bounces": {k: bounced[stem][k] for k in ("object", "shadow")}}
-        item["is_in_step"] = (item["outcome"] == "result" and
-                              item["receipt"]["lighting_sequence"] == item["environment_frame"])
+        item["is_in_step"] = item["receipt"]["lighting_sequence"] == item["environment_frame"]
         if i in shown:
             item["same_as_gnomon_render"] = render_offline(
                 render, folder, sequence, frame, out, os.path.join(composites, stem + ".png"))
