@@ -33,7 +33,8 @@ int gn_cmd_doctor(int argc, char *const argv[]);
          .help = "The room to enter; without it the server's first."},                             \
     {                                                                                              \
         .key = "token", .flag = "token", .type = GN_OPTION_STRING, .value_name = "SECRET",         \
-        .is_secret = true, .help = "The secret that the server asks for, if it does."              \
+        .is_secret = true,                                                                         \
+        .help = "The secret that the server asks for, if it does; gnomond 0.1 knows none."         \
     }
 
 /** Rows of the option table that every command which replays pictures has. */

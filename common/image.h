@@ -71,10 +71,4 @@ static inline uint8_t *gn_image8_at(const struct gn_image8 *image, int x, int y)
     return image->data + ((size_t)y * (size_t)image->width + (size_t)x) * (size_t)image->channels;
 }
 
-/** The pixel at column x of row y, [channels]. */
-static inline uint16_t *gn_image16_at(const struct gn_image16 *image, int x, int y)
-{
-    return image->data + ((size_t)y * (size_t)image->width + (size_t)x) * (size_t)image->channels;
-}
-
 #endif

@@ -97,9 +97,8 @@ GN_MUST_USE int gn_room_put_frame(struct gn_room_session *session, const struct 
                                   struct gn_buf *payload, int64_t received_ns,
                                   struct gn_error *out_error);
 
-/** Frames/s at 640 x 480 that each viewer can count on; 0: not measured yet. */
-double gn_room_get_holdable_fps(struct gn_room *room);
-/** The same as the room's viewers would have with one more of them. */
+/** Frames/s at 640 x 480 that each viewer could count on if there were so many more of them [0, 1];
+ * 0: not measured yet. */
 double gn_room_get_holdable_fps_with(struct gn_room *room, int more_viewers);
 
 /** STATISTICS of this moment. */

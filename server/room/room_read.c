@@ -26,11 +26,6 @@ double gn_room_get_holdable_fps_with(struct gn_room *room, int more_viewers)
     return fps / (n > 1 ? n : 1);
 }
 
-double gn_room_get_holdable_fps(struct gn_room *room)
-{
-    return gn_room_get_holdable_fps_with(room, 0);
-}
-
 void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figures)
 {
     gn_mutex_lock(&room->mu);

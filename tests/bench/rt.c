@@ -33,8 +33,8 @@ static struct gn_rt *make_scene(void)
     return rt;
 }
 
-/** coherent: the rays of a packet start at one point each but go to one light; else one point, 16
- * lights. */
+/** to_one_light: the rays of a packet start at one point each but go to one light; else one point,
+ * 16 lights. */
 static void make_packets(struct gn_rt_packet *packets, bool to_one_light)
 {
     uint64_t seed = 8;

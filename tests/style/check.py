@@ -29,7 +29,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
 
 def files(root):
-    out = subprocess.run(["git", "-C", root, "ls-files", "-co", "--exclude-standard"],
+    out = subprocess.run(["git", "-c", "safe.directory=*", "-C", root, "ls-files"],
                          capture_output=True, text=True, check=True).stdout
     return [p for p in out.split("\n") if p and os.path.isfile(os.path.join(root, p))]
 
