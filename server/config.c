@@ -27,12 +27,10 @@ static int get_scene_path(const struct gn_options *o, const char *room, char out
 
 static void get_light(const struct gn_options *o, const char *room, struct gn_light_options *out)
 {
-    static const enum gn_light_method methods[] = {GN_LIGHT_PARTITION_ENERGY,
-                                                   GN_LIGHT_PARTITION_SEED, GN_LIGHT_PENROSE};
     static const enum gn_partition_metric metrics[] = {GN_METRIC_DEFAULT, GN_METRIC_POW2,
                                                        GN_METRIC_TWICE, GN_METRIC_LOG2};
     *out = (struct gn_light_options){
-        .method = methods[gn_options_get_enum(o, "room", room, "light-method")],
+        .method = (enum gn_light_method)gn_options_get_enum(o, "room", room, "light-method"),
         .n_lights = gn_options_get_int(o, "room", room, "lights"),
         .rings = gn_options_get_int(o, "room", room, "light-rings"),
         .sectors = gn_options_get_int(o, "room", room, "light-sectors"),

@@ -56,7 +56,7 @@ static const struct gn_option table[] = {
     {ROOM, .key = "scene", .value_name = "FILE", .is_required = true,
      .help = "The scene: real and virtual objects. A relative path counts from the configuration "
              "file's folder."},
-    {ROOM, .key = "light-method", .type = GN_OPTION_ENUM, .choices = "partition|seed|penrose",
+    {ROOM, .key = "light-method", .type = GN_OPTION_ENUM, .choices = GN_LIGHT_METHOD_NAMES,
      .default_value = "partition",
      .help = "How lights are made from the radiance map: regions that keep their energy; the 2007 "
              "paper's regions to the letter; or the importance samples themselves."},

@@ -62,17 +62,4 @@ GN_MUST_USE int gn_light_settings_init(struct gn_light_settings *settings,
                                        const struct gn_radiance_map *map,
                                        struct gn_error *out_error);
 
-/** The paper's partition, in any reading (partition.c). */
-GN_MUST_USE int gn_partition_make_lights(const struct gn_radiance_map *map,
-                                         const struct gn_light_settings *settings,
-                                         const struct gn_partition_plan *plan, struct gn_pool *pool,
-                                         struct gn_light_list *list,
-                                         struct gn_light_figures *figures);
-/** The importance samples themselves, of equal power (penrose_lights.c). */
-GN_MUST_USE int gn_penrose_make_lights(const struct gn_radiance_map *map,
-                                       const struct gn_light_settings *settings,
-                                       const struct gn_partition_plan *plan,
-                                       struct gn_light_list *list,
-                                       struct gn_light_figures *figures);
-
 #endif

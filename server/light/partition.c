@@ -12,9 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/light/lights.h"
 #include "server/light/luminance.h"
 #include "server/light/map_samples.h"
+#include "server/light/method.h"
 #include "server/light/region_split.h"
 
 /* Of the mean: means nearer than this are equal, whatever the order of their sums. */
@@ -420,11 +420,12 @@ static int make_lights(struct partition *p, struct gn_patch *cells, struct gn_po
     return rc;
 }
 
-int gn_partition_make_lights(const struct gn_radiance_map *map,
-                             const struct gn_light_settings *settings,
-                             const struct gn_partition_plan *plan, struct gn_pool *pool,
-                             struct gn_light_list *list, struct gn_light_figures *figures)
+int gn_partition_make_lights(const struct gn_light_input *input, struct gn_light_list *list,
+                             struct gn_light_figures *figures)
 {
+    const struct gn_radiance_map *map = input->map;
+    const struct gn_light_settings *settings = input->settings;
+    const struct gn_partition_plan *plan = input->plan;
     unsigned sampled = GN_READ_SAMPLE_MEAN | GN_READ_SAMPLE_MAX | GN_READ_BRIGHTEST;
     struct partition p = {.map = map,
                           .settings = settings,
@@ -437,7 +438,7 @@ int gn_partition_make_lights(const struct gn_radiance_map *map,
         return 0; // all black: no lights
     p.regions = calloc((size_t)plan->n_regions, sizeof(*p.regions));
     struct gn_patch *cells = calloc((size_t)plan->n_dark_cells, sizeof(*cells));
-    int rc = p.regions && cells ? make_lights(&p, cells, pool, list, figures) : -ENOMEM;
+    int rc = p.regions && cells ? make_lights(&p, cells, input->pool, list, figures) : -ENOMEM;
     free(cells);
     free(p.is_lit);
     free(p.slots);

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#include "server/light/lights.h"
+#include "server/light/method.h"
 
 #include <math.h>
 
@@ -56,11 +56,12 @@ static int add_samples(const struct gn_radiance_map *map, const struct gn_map_sa
     return 0;
 }
 
-int gn_penrose_make_lights(const struct gn_radiance_map *map,
-                           const struct gn_light_settings *settings,
-                           const struct gn_partition_plan *plan, struct gn_light_list *list,
+int gn_penrose_make_lights(const struct gn_light_input *input, struct gn_light_list *list,
                            struct gn_light_figures *figures)
 {
+    const struct gn_radiance_map *map = input->map;
+    const struct gn_light_settings *settings = input->settings;
+    const struct gn_partition_plan *plan = input->plan;
     struct gn_map_samples samples = {0};
     int n_fill = gn_luminance(map->fill) > 0 ? plan->n_fill_cells : 0;
     int n_wanted = settings->n_aim > n_fill ? settings->n_aim - n_fill : 1;

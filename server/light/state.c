@@ -5,34 +5,11 @@
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "common/clock.h"
-#include "server/light/lights.h"
 #include "server/light/luminance.h"
+#include "server/light/method.h"
 #include "server/light/sh.h"
-
-static const char *const names[GN_LIGHT_METHOD_COUNT] = {
-    [GN_LIGHT_PARTITION_ENERGY] = "partition",
-    [GN_LIGHT_PARTITION_SEED] = "seed",
-    [GN_LIGHT_PENROSE] = "penrose",
-};
-
-const char *gn_light_method_get_name(enum gn_light_method method)
-{
-    return (unsigned)method < GN_LIGHT_METHOD_COUNT ? names[method] : NULL;
-}
-
-int gn_light_method_from_name(const char *name, enum gn_light_method *out_method)
-{
-    for (int i = 0; i < GN_LIGHT_METHOD_COUNT; i++) {
-        if (strcmp(name, names[i]) == 0) {
-            *out_method = (enum gn_light_method)i;
-            return 0;
-        }
-    }
-    return -EINVAL;
-}
 
 /* A light with its place in the list, which decides between equals. */
 struct ranked_light {
@@ -82,11 +59,13 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     struct gn_light_list list = {0};
     rc = gn_partition_plan_create(state->map, &settings.division,
                                   options->previous ? options->previous->plan : NULL, &state->plan);
-    if (rc == 0 && settings.method == GN_LIGHT_PENROSE)
-        rc = gn_penrose_make_lights(state->map, &settings, state->plan, &list, &state->figures);
-    else if (rc == 0)
-        rc = gn_partition_make_lights(state->map, &settings, state->plan, pool, &list,
-                                      &state->figures);
+    const struct gn_light_input input = {.map = state->map,
+                                         .settings = &settings,
+                                         .plan = state->plan,
+                                         .previous = options->previous,
+                                         .pool = pool};
+    if (rc == 0)
+        rc = gn_light_maker_get(settings.method)->make(&input, &list, &state->figures);
     if (rc == 0)
         rc = take_lights(state, &list);
     gn_light_list_finish(&list);

@@ -20,6 +20,7 @@ struct gn_light {
     float dir_world[3];   // unit, towards the light
     float angular_radius; // rad, of the disc as spread out as the light's region; 0: unknown
     float irradiance[3];  // RGB at normal incidence, W/m^2
+    uint64_t id;          // its own in the state; the same light in the stream's next; 0: none
 };
 
 /** How lights are made from the map. */
@@ -113,7 +114,9 @@ struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state)
 /** NULL-safe; nulls *state. */
 void gn_lighting_state_unref(struct gn_lighting_state **state);
 
-/** "partition", "seed", "penrose"; NULL for a bad method. */
+/** The names of all methods, as a list of choices. */
+#define GN_LIGHT_METHOD_NAMES "partition|seed|penrose"
+/** One of them; NULL for a bad method. */
 const char *gn_light_method_get_name(enum gn_light_method method);
 /** The method of that name, or -EINVAL. */
 GN_MUST_USE int gn_light_method_from_name(const char *name, enum gn_light_method *out_method);

@@ -12,7 +12,6 @@
 #define PROJECTIONS                                                                                \
     "latlong|angular|mirrorball|fisheye-equidistant|fisheye-equisolid|fisheye-orthographic|"       \
     "fisheye-stereographic|fisheye-kannala-brandt"
-#define METHODS "partition|seed|penrose"
 #define SHADINGS "lights|irradiance"
 
 static const struct gn_option table[] = {
@@ -66,7 +65,7 @@ static const struct gn_option table[] = {
      .help = "Wanted number of lights, where the method can aim; without it: the method's own."},
     {.key = "light-method",
      .type = GN_OPTION_ENUM,
-     .choices = METHODS,
+     .choices = GN_LIGHT_METHOD_NAMES,
      .help = "How the map becomes lights; without it: partition, or seed with --quality seed."},
     {.key = "bounces",
      .type = GN_OPTION_INT,
