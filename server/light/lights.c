@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "server/light/luminance.h"
 
@@ -101,6 +102,14 @@ void gn_light_list_finish(struct gn_light_list *list)
     *list = (struct gn_light_list){0};
 }
 
+void gn_light_memory_destroy(struct gn_light_memory **memory)
+{
+    if (*memory)
+        free((*memory)->marks);
+    free(*memory);
+    *memory = NULL;
+}
+
 static bool is_in(int value, int low, int high)
 {
     return value == 0 || (value >= low && value <= high);
@@ -112,6 +121,8 @@ static const char *check_options(const struct gn_light_options *o)
         return "the method is unknown";
     if ((unsigned)o->metric > GN_METRIC_LOG2)
         return "the metric is unknown";
+    if ((unsigned)o->weights >= GN_WEIGHTS_COUNT)
+        return "the weights are unknown";
     if (o->n_lights != GN_LIGHTS_NO_AIM && !is_in(o->n_lights, 1, GN_LIGHTS_MAX))
         return "the number of lights must lie in [1, 4096]";
     if (!is_in(o->rings, 1, 64) || !is_in(o->sectors, 1, 256))
@@ -141,7 +152,12 @@ int gn_light_settings_init(struct gn_light_settings *settings,
     const char *reason = check_options(o);
     bool is_seed = o->method == GN_LIGHT_PARTITION_SEED;
     bool has_aim = o->n_lights != GN_LIGHTS_NO_AIM && !is_seed;
-    struct gn_light_settings s = {.method = o->method, .metric = o->metric};
+    struct gn_light_settings s;
+    memset(&s, 0, sizeof(s)); // with its padding
+    s.method = o->method;
+    s.metric = o->metric;
+    s.weights = o->weights;
+    s.relaxed = o->relaxed;
     s.literal = ((is_seed ? GN_READ_ALL : 0) | o->literal) & ~o->mended;
     if (s.metric == GN_METRIC_DEFAULT)
         s.metric = is_seed ? GN_METRIC_POW2 : GN_METRIC_LOG2;
@@ -162,6 +178,6 @@ int gn_light_settings_init(struct gn_light_settings *settings,
     s.n_samples = o->n_samples > 0 ? o->n_samples : 16 * s.division.rings * s.division.sectors;
     if (!has_aim || (s.method == GN_LIGHT_PARTITION_ENERGY && s.metric != GN_METRIC_LOG2))
         s.n_aim = o->method == GN_LIGHT_PENROSE ? 64 : 0;
-    *settings = s;
+    memcpy(settings, &s, sizeof(s)); // with its padding
     return 0;
 }

@@ -45,7 +45,10 @@ GN_MUST_USE int gn_light_list_add_fill(struct gn_light_list *list,
                                        const struct gn_partition_plan *plan, int *out_n);
 void gn_light_list_finish(struct gn_light_list *list);
 
-/** The options with each default of their method filled in, and what follows from them. */
+/**
+ * The options with each default of their method filled in, and what follows from them. Compared
+ * byte by byte: zero it before use.
+ */
 struct gn_light_settings {
     enum gn_light_method method;
     unsigned literal; // the readings in effect
@@ -54,7 +57,22 @@ struct gn_light_settings {
     int max_ls;
     int n_samples;
     int n_aim; // 0: none
+    enum gn_light_weights weights;
+    bool relaxed;
 };
+
+/**
+ * What a method keeps of one frame for the next of the stream, so that its decisions have
+ * hysteresis. Only methods know what their figures and marks mean. Zeroed: nothing kept.
+ */
+struct gn_light_memory {
+    struct gn_light_settings settings; // that it was kept under
+    double figure[4];
+    int n_marks;
+    uint64_t *marks; // [n_marks], owned
+};
+/** NULL-safe; nulls *memory. */
+void gn_light_memory_destroy(struct gn_light_memory **memory);
 
 /** Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_light_settings_init(struct gn_light_settings *settings,

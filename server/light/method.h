@@ -14,6 +14,8 @@ struct gn_light_input {
     const struct gn_light_settings *settings;
     const struct gn_partition_plan *plan;     // base division and the cells of the fill
     const struct gn_lighting_state *previous; // the stream's last state, or NULL
+    const struct gn_light_memory *remembered; // of the last frame; NULL: of other settings, plan
+    struct gn_light_memory *memory;           // for the next frame, zeroed: the method may fill it
     struct gn_pool *pool;                     // may be NULL
 };
 

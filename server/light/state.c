@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "common/clock.h"
 #include "server/light/luminance.h"
@@ -49,6 +50,17 @@ static int take_lights(struct gn_lighting_state *state, const struct gn_light_li
     return 0;
 }
 
+/* What was kept under the same settings and plan. */
+static const struct gn_light_memory *recall(const struct gn_lighting_state *state,
+                                            const struct gn_lighting_state *previous)
+{
+    if (!previous || !previous->memory || previous->plan != state->plan ||
+        memcmp(&previous->memory->settings, &state->memory->settings,
+               sizeof(state->memory->settings)) != 0)
+        return NULL;
+    return previous->memory;
+}
+
 static int make_lights(struct gn_lighting_state *state, const struct gn_light_options *options,
                        struct gn_pool *pool, struct gn_error *out_error)
 {
@@ -57,15 +69,23 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     if (rc < 0)
         return rc;
     struct gn_light_list list = {0};
-    rc = gn_partition_plan_create(state->map, &settings.division,
-                                  options->previous ? options->previous->plan : NULL, &state->plan);
-    const struct gn_light_input input = {.map = state->map,
-                                         .settings = &settings,
-                                         .plan = state->plan,
-                                         .previous = options->previous,
-                                         .pool = pool};
+    state->memory = calloc(1, sizeof(*state->memory));
+    rc = state->memory ? 0 : -ENOMEM;
     if (rc == 0)
+        rc = gn_partition_plan_create(state->map, &settings.division,
+                                      options->previous ? options->previous->plan : NULL,
+                                      &state->plan);
+    if (rc == 0) {
+        memcpy(&state->memory->settings, &settings, sizeof(settings));
+        const struct gn_light_input input = {.map = state->map,
+                                             .settings = &settings,
+                                             .plan = state->plan,
+                                             .previous = options->previous,
+                                             .remembered = recall(state, options->previous),
+                                             .memory = state->memory,
+                                             .pool = pool};
         rc = gn_light_maker_get(settings.method)->make(&input, &list, &state->figures);
+    }
     if (rc == 0)
         rc = take_lights(state, &list);
     gn_light_list_finish(&list);
@@ -145,6 +165,7 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
     *state = NULL;
     if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
         return;
+    gn_light_memory_destroy(&s->memory);
     gn_partition_plan_unref(&s->plan);
     gn_radiance_map_unref(&s->map);
     free(s->lights);

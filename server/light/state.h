@@ -10,6 +10,7 @@
 
 #include "server/light/radiance_map.h"
 
+struct gn_light_memory;   // server/light/lights.h
 struct gn_partition_plan; // server/light/partition_plan.h
 
 /** Most lights a state may hold. */
@@ -52,6 +53,14 @@ enum gn_partition_reading {
     GN_READ_ALL = (1 << 9) - 1
 };
 
+/** How the power is shared out among importance samples. */
+enum gn_light_weights {
+    GN_WEIGHTS_EQUAL = 0,     // all the same power, in the colour about the sample (W1)
+    GN_WEIGHTS_DENSITY = 1,   // radiance over samples per steradian (W2)
+    GN_WEIGHTS_PARTITION = 2, // each texel's light to its nearest sample (W3)
+    GN_WEIGHTS_COUNT
+};
+
 /** n_lights of a caller who wants the metric's own count. */
 #define GN_LIGHTS_NO_AIM (-1)
 
@@ -68,7 +77,10 @@ struct gn_light_options {
     enum gn_partition_metric metric; // default log2 (energy) or 2^k (seed)
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)
     unsigned mended;  // GN_READ_* not taken to the letter after all
-    bool no_sh;       // leave the SH irradiance out
+    enum gn_light_weights weights; // of importance samples as lights; default equal
+    bool relaxed; // importance samples moved by the correction table: evener, but they move
+                  // with the light: for still pictures, not for streams
+    bool no_sh;   // leave the SH irradiance out
     const struct gn_lighting_state *previous; // borrowed during the call, may be NULL: the last
                                               // state of the stream, whose tables are used again
 };
@@ -98,6 +110,7 @@ struct gn_lighting_state {
     struct gn_light_figures figures;
     struct gn_partition_plan *plan; // which texel lies in which base region; shared (ref), may be
                                     // NULL
+    struct gn_light_memory *memory; // what the method keeps for the next frame; owned, may be NULL
     uint64_t sequence;              // of the environment frame
     int64_t capture_time_ns;
     int64_t published_time_ns;
