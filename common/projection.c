@@ -7,7 +7,9 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "common/cube_map.h"
 #include "common/image.h"
+#include "common/octahedral.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -23,7 +25,15 @@ static const char *const names[GN_PROJECTION_COUNT] = {
     [GN_PROJECTION_FISHEYE_ORTHOGRAPHIC] = "fisheye-orthographic",
     [GN_PROJECTION_FISHEYE_STEREOGRAPHIC] = "fisheye-stereographic",
     [GN_PROJECTION_FISHEYE_KANNALA_BRANDT] = "fisheye-kannala-brandt",
+    [GN_PROJECTION_CUBE] = "cube",
+    [GN_PROJECTION_OCTAHEDRAL] = "octahedral",
 };
+
+bool gn_projection_is_radial(enum gn_projection_type type)
+{
+    return type != GN_PROJECTION_LATLONG && type != GN_PROJECTION_CUBE &&
+           type != GN_PROJECTION_OCTAHEDRAL;
+}
 
 const char *gn_projection_get_name(enum gn_projection_type type)
 {
@@ -201,7 +211,10 @@ int gn_projection_init(struct gn_projection *projection, const char **out_reason
     } else if (p.width < 1 || p.width > GN_IMAGE_MAX_SIDE || p.height < 1 ||
                p.height > GN_IMAGE_MAX_SIDE || (long)p.width * p.height > GN_IMAGE_MAX_PIXELS) {
         reason = "the picture's sides must lie in [1, 16384] px, its pixels below 67108864";
-    } else if (p.type == GN_PROJECTION_LATLONG) {
+    } else if (p.type == GN_PROJECTION_CUBE && p.height != GN_CUBE_FACES * p.width) {
+        reason = "a cube map is six squares, one below the other: its height must be six times its "
+                 "width";
+    } else if (!gn_projection_is_radial(p.type)) {
         p = (struct gn_projection){.type = p.type,
                                    .width = p.width,
                                    .height = p.height,
@@ -226,17 +239,52 @@ static bool is_inside(const struct gn_projection *p, double x, double y)
     return x >= 0 && x <= p->width && y >= 0 && y <= p->height;
 }
 
+/* Of the pictures that show the whole sphere edge to edge; (x, y) inside. */
+static void get_sphere_direction(const struct gn_projection *p, double x, double y,
+                                 double out_dir[static 3])
+{
+    if (p->type == GN_PROJECTION_CUBE) {
+        double side = p->width;
+        int face = (int)fmin(y / side, GN_CUBE_FACES - 1);
+        gn_cube_map_to_direction(face, 2 * x / side - 1, 1 - 2 * (y - face * side) / side, out_dir);
+    } else if (p->type == GN_PROJECTION_OCTAHEDRAL) {
+        gn_octahedral_to_direction(x / p->width, y / p->height, out_dir);
+    } else {
+        double theta = pi * y / p->height, phi = pi - 2 * pi * x / p->width;
+        out_dir[0] = sin(theta) * cos(phi);
+        out_dir[1] = sin(theta) * sin(phi);
+        out_dir[2] = cos(theta);
+    }
+}
+
+static void get_sphere_position(const struct gn_projection *p, const double dir[static 3],
+                                double out_xy[static 2])
+{
+    if (p->type == GN_PROJECTION_CUBE) {
+        double st[2];
+        int face = gn_cube_map_from_direction(dir, st);
+        out_xy[0] = 0.5 * (1 + st[0]) * p->width;
+        out_xy[1] = (face + 0.5 * (1 - st[1])) * p->width;
+    } else if (p->type == GN_PROJECTION_OCTAHEDRAL) {
+        double uv[2];
+        gn_octahedral_from_direction(dir, uv);
+        out_xy[0] = uv[0] * p->width;
+        out_xy[1] = uv[1] * p->height;
+    } else {
+        double x = (pi - atan2(dir[1], dir[0])) / (2 * pi) * p->width;
+        out_xy[0] = x >= p->width ? 0 : x; // phi = -pi is phi = pi
+        out_xy[1] = fmin(atan2(hypot(dir[0], dir[1]), dir[2]) / pi, 1) * p->height;
+    }
+}
+
 bool gn_projection_get_direction(const struct gn_projection *projection, double x, double y,
                                  double out_dir[static 3])
 {
     const struct gn_projection *p = projection;
     if (!is_inside(p, x, y))
         return false;
-    if (p->type == GN_PROJECTION_LATLONG) {
-        double theta = pi * y / p->height, phi = pi - 2 * pi * x / p->width;
-        out_dir[0] = sin(theta) * cos(phi);
-        out_dir[1] = sin(theta) * sin(phi);
-        out_dir[2] = cos(theta);
+    if (!gn_projection_is_radial(p->type)) {
+        get_sphere_direction(p, x, y, out_dir);
         return true;
     }
     double dx = x - p->center[0], dy = y - p->center[1], r = hypot(dx, dy);
@@ -254,26 +302,23 @@ bool gn_projection_get_position(const struct gn_projection *projection, const do
                                 double out_xy[static 2])
 {
     const struct gn_projection *p = projection;
-    double sin_theta = hypot(dir[0], dir[1]), theta = atan2(sin_theta, dir[2]);
-    double x, y;
-    if (p->type == GN_PROJECTION_LATLONG) {
-        x = (pi - atan2(dir[1], dir[0])) / (2 * pi) * p->width;
-        if (x >= p->width) // phi = -pi is phi = pi
-            x = 0;
-        y = fmin(theta / pi, 1) * p->height;
+    double xy[2];
+    if (!gn_projection_is_radial(p->type)) {
+        get_sphere_position(p, dir, xy);
     } else {
+        double sin_theta = hypot(dir[0], dir[1]), theta = atan2(sin_theta, dir[2]);
         if (!(theta <= p->theta_max))
             return false;
         double r = fmin(p->focal * get_rho(p, theta), p->radius);
         double ux = sin_theta > 0 ? dir[0] / sin_theta : 1;
         double uy = sin_theta > 0 ? dir[1] / sin_theta : 0;
-        x = p->center[0] + r * ux;
-        y = p->center[1] + (p->type == GN_PROJECTION_MIRRORBALL ? -r * uy : r * uy);
+        xy[0] = p->center[0] + r * ux;
+        xy[1] = p->center[1] + (p->type == GN_PROJECTION_MIRRORBALL ? -r * uy : r * uy);
     }
-    if (!is_inside(p, x, y)) // NaN too
+    if (!is_inside(p, xy[0], xy[1])) // NaN too
         return false;
-    out_xy[0] = x;
-    out_xy[1] = y;
+    out_xy[0] = xy[0];
+    out_xy[1] = xy[1];
     return true;
 }
 
@@ -352,6 +397,12 @@ double gn_projection_get_solid_angle(const struct gn_projection *projection, int
     const struct gn_projection *p = projection;
     if (p->type == GN_PROJECTION_LATLONG) // cos a - cos b = 2 sin((a + b) / 2) sin((b - a) / 2)
         return 4 * pi / p->width * sin(pi * (iy + 0.5) / p->height) * sin(0.5 * pi / p->height);
+    if (p->type == GN_PROJECTION_OCTAHEDRAL)
+        return 4 * pi / p->width / p->height;
+    if (p->type == GN_PROJECTION_CUBE) {
+        double step = 2.0 / p->width, s = ix * step - 1, t = iy % p->width * step - 1;
+        return gn_cube_map_get_solid_angle(s, t, s + step, t + step); // alike upside down
+    }
     double x0 = ix - p->center[0], y0 = iy - p->center[1], x1 = x0 + 1, y1 = y0 + 1;
     double near_x = fmax(fmax(x0, -x1), 0), near_y = fmax(fmax(y0, -y1), 0);
     if (near_x * near_x + near_y * near_y >= p->radius * p->radius)
@@ -361,10 +412,38 @@ double gn_projection_get_solid_angle(const struct gn_projection *projection, int
     return fmax(sum, 0);
 }
 
+bool gn_projection_step(const struct gn_projection *projection, int dx, int dy, int xy[static 2])
+{
+    const struct gn_projection *p = projection;
+    int x = xy[0] + dx, y = xy[1] + dy;
+    if (p->type == GN_PROJECTION_LATLONG) {
+        if (y < 0 || y >= p->height) { // over the pole
+            y = xy[1];
+            x += p->width / 2;
+        }
+        x = (x + p->width) % p->width;
+    } else if (p->type == GN_PROJECTION_OCTAHEDRAL) {
+        bool is_beside = x < 0 || x >= p->width, is_above = y < 0 || y >= p->height;
+        x = is_beside ? xy[0] : x;
+        y = is_above ? xy[1] : y;
+        if (is_beside) // each half of a side meets the other
+            y = p->height - 1 - y;
+        if (is_above)
+            x = p->width - 1 - x;
+    } else if (p->type == GN_PROJECTION_CUBE && (y < 0 || y / p->width != xy[1] / p->width)) {
+        return false;
+    }
+    if (x < 0 || x >= p->width || y < 0 || y >= p->height)
+        return false;
+    xy[0] = x;
+    xy[1] = y;
+    return true;
+}
+
 bool gn_projection_is_full_sphere(const struct gn_projection *projection)
 {
     const struct gn_projection *p = projection;
-    if (p->type == GN_PROJECTION_LATLONG)
+    if (!gn_projection_is_radial(p->type))
         return true;
     double slack = 1e-6 * p->radius;
     return p->theta_max >= pi - pi_slack && p->center[0] >= p->radius - slack &&

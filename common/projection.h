@@ -7,7 +7,10 @@
  *   mirror ball: x right, y up, seen along -z: the middle of the ball reflects +z, its rim -z;
  *   lat-long: z up, row 0 is +z; picture position (u, v) in [0, 1]^2 is theta = pi v,
  *     phi = pi - 2 pi u, d = (sin theta cos phi, sin theta sin phi, cos theta): the middle looks
- *     along +x, the right half towards -y.
+ *     along +x, the right half towards -y;
+ *   cube: the axes of lat-long; six square faces one below the other (common/cube_map.h);
+ *   octahedral, equal-area: the axes of a fisheye; the middle of the picture shows +z, its corners
+ *     -z (common/octahedral.h).
  * Pixel centres lie at half-integers: the centre of pixel (0, 0) is (0.5, 0.5).
  */
 #ifndef GN_COMMON_PROJECTION_H
@@ -30,6 +33,8 @@ enum gn_projection_type {
     GN_PROJECTION_FISHEYE_ORTHOGRAPHIC = 5,   // r = f sin t
     GN_PROJECTION_FISHEYE_STEREOGRAPHIC = 6,  // r = 2 f tan(t / 2)
     GN_PROJECTION_FISHEYE_KANNALA_BRANDT = 7, // r = f (t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9)
+    GN_PROJECTION_CUBE = 8,                   // height = 6 width
+    GN_PROJECTION_OCTAHEDRAL = 9,             // every pixel 4 pi / (width height) sr
     GN_PROJECTION_COUNT
 };
 
@@ -38,7 +43,8 @@ struct gn_projection {
     enum gn_projection_type type;
     int width;  // px
     int height; // px
-    // The rest is of the radial models; init overwrites it for lat-long.
+    // The rest is of the radial models (fisheyes, angular map, mirror ball); init overwrites it for
+    // the others.
     double center[2]; // px; both 0: the middle of the picture
     double radius; // px, of the circle at theta_max; default from focal, or half the smaller side
     double theta_max; // rad, (0, pi]; default pi/2 for a fisheye, pi for angular and mirror ball
@@ -52,9 +58,12 @@ struct gn_projection {
  * a size out of range, a number not finite, theta_max beyond the model's domain (orthographic pi/2,
  * stereographic below pi), a polynomial that does not rise up to theta_max, a radius and a focal
  * length that contradict each other, a circle that misses the picture. *projection is untouched
- * then.
+ * then; or a cube map that is not six squares.
  */
 GN_MUST_USE int gn_projection_init(struct gn_projection *projection, const char **out_reason);
+
+/** True for the pictures that are a circle: fisheyes, angular map, mirror ball. */
+bool gn_projection_is_radial(enum gn_projection_type type);
 
 /** "latlong", "angular", "mirrorball", "fisheye-equidistant", ...; NULL for a bad type. */
 const char *gn_projection_get_name(enum gn_projection_type type);
@@ -77,15 +86,23 @@ bool gn_projection_get_position(const struct gn_projection *projection, const do
                                 double out_xy[static 2]);
 
 /**
- * Solid angle in sr of pixel (ix, iy), the part inside the valid circle; 0 outside. Lat-long: exact
- * per row. Radial models: the integral of sin(theta) / (f^2 rho rho') over the pixel, as the
- * contour integral of (1 - cos theta) dpsi around it (Green's theorem; psi is the azimuth), which
- * needs no clipping at the rim. Pixels share their edges' integrals, so the sum over a picture is
- * the shown solid angle to rounding. ix in [0, width), iy in [0, height).
+ * Solid angle in sr of pixel (ix, iy), the part inside the valid circle; 0 outside. Lat-long, cube
+ * and octahedral: closed forms. Radial models: the integral of sin(theta) / (f^2 rho rho') over the
+ * pixel, as the contour integral of (1 - cos theta) dpsi around it (Green's theorem; psi is the
+ * azimuth), which needs no clipping at the rim. Pixels share their edges' integrals, so the sum
+ * over a picture is the shown solid angle to rounding. ix in [0, width), iy in [0, height).
  */
 double gn_projection_get_solid_angle(const struct gn_projection *projection, int ix, int iy);
 
-/** True where the picture shows all 4 pi sr: lat-long, and whole circles with theta_max pi. */
+/**
+ * Moves *xy from a pixel to the one beside it, dx and dy in {-1, 0, 1}, as the sphere goes on: a
+ * lat-long closes at its sides and over its poles, an octahedral map folds at its border. False,
+ * and *xy untouched, beyond the picture, and beyond a cube's face.
+ */
+bool gn_projection_step(const struct gn_projection *projection, int dx, int dy, int xy[static 2]);
+
+/** True where the picture shows all 4 pi sr: lat-long, cube, octahedral, and whole circles with
+ * theta_max pi. */
 bool gn_projection_is_full_sphere(const struct gn_projection *projection);
 
 #endif

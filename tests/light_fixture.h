@@ -20,11 +20,14 @@ struct light_fixture {
     struct gn_environment_frame frame;
 };
 
-/** A black linear frame of that projection, its axes the world's. 0 or a negative errno. */
+/** A black linear frame of that projection, its axes the world's; of a cube map the height follows
+ * from the width. 0 or a negative errno. */
 static inline int light_fixture_init(struct light_fixture *f, enum gn_projection_type type,
                                      int width, int height)
 {
     *f = (struct light_fixture){0};
+    if (type == GN_PROJECTION_CUBE)
+        height = 6 * width;
     int rc = gn_image_init(&f->image, width, height, 3);
     f->frame = (struct gn_environment_frame){
         .projection = {.type = type, .width = width, .height = height},

@@ -23,7 +23,7 @@ static bool is_same_projection(const struct gn_projection *a, const struct gn_pr
 /* The position of the texel's centre, drawn into the circle where it lies outside. */
 static bool clamp_to_circle(const struct gn_projection *p, double margin, double xy[static 2])
 {
-    if (p->type == GN_PROJECTION_LATLONG)
+    if (!gn_projection_is_radial(p->type))
         return false;
     double dx = xy[0] - p->center[0], dy = xy[1] - p->center[1], r = hypot(dx, dy);
     if (r <= p->radius)
@@ -73,7 +73,7 @@ static void rotate_row(void *context, int y, int worker)
 static int list_rim(struct gn_map_table *t)
 {
     const struct gn_projection *p = &t->projection;
-    if (p->type == GN_PROJECTION_LATLONG)
+    if (!gn_projection_is_radial(p->type))
         return 0;
     for (int pass = 0; pass < 2; pass++) {
         int n = 0;
@@ -153,7 +153,7 @@ static void sum_solid_angles(struct gn_map_table *t)
     double reach = p->radius * (1 - 1e-6);
     bool is_cut = p->center[0] < reach || p->center[0] + reach > p->width || p->center[1] < reach ||
                   p->center[1] + reach > p->height;
-    if (p->type == GN_PROJECTION_LATLONG || gn_projection_is_full_sphere(p))
+    if (gn_projection_is_full_sphere(p))
         return;
     if (is_cut)
         subtract_texels(t);

@@ -29,7 +29,7 @@ struct gn_map_table {
     double shown_solid_angle;   // sr
     double fill_solid_angle;    // sr, of the directions not shown
     double fill_harmonics[9];   // integral over them of gn_sh_harmonics, world axes
-    double axis_world[3];       // optical axis; z of a lat-long's own frame
+    double axis_world[3];       // optical axis; z of the frame of a whole sphere's picture
     _Atomic(float *) spare;     // pixels of a freed map, or NULL; taken by the next one
 };
 

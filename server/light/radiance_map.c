@@ -115,15 +115,13 @@ static void mend_infinite_texel(const struct gn_image *codes, struct gn_radiance
     float values[3][8];
     int n = 0;
     for (int i = 0; i < 9; i++) {
-        int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
-        if (map->projection.type == GN_PROJECTION_LATLONG)
-            nx = (nx + codes->width) % codes->width;
-        if (i == 4 || nx < 0 || nx >= codes->width || ny < 0 || ny >= codes->height ||
-            is_infinite_texel(codes, nx, ny) ||
-            !(map->solid_angle[(size_t)ny * (size_t)codes->width + (size_t)nx] > 0))
+        int at[2] = {x, y};
+        if (i == 4 || !gn_projection_step(&map->projection, i % 3 - 1, i / 3 - 1, at) ||
+            is_infinite_texel(codes, at[0], at[1]) ||
+            !(map->solid_angle[(size_t)at[1] * (size_t)codes->width + (size_t)at[0]] > 0))
             continue;
         for (int c = 0; c < 3; c++)
-            values[c][n] = gn_image_at(&map->radiance, nx, ny)[c];
+            values[c][n] = gn_image_at(&map->radiance, at[0], at[1])[c];
         n++;
     }
     for (int c = 0; c < 3; c++)
@@ -359,23 +357,15 @@ void gn_radiance_map_unref(struct gn_radiance_map **map)
     free(m);
 }
 
-/* Adds texel (x, y), its weight and light, if it shows any. Beyond a pole lies the other side. */
-static void add_tap(const struct gn_radiance_map *map, int x, int y, double weight,
-                    double sum[static 4])
+/* Adds the light of the texel beside texel home, if it shows any. */
+static void add_tap(const struct gn_radiance_map *map, const int home[static 2], int dx, int dy,
+                    double weight, double sum[static 4])
 {
-    int width = map->radiance.width, height = map->radiance.height;
-    if (map->projection.type == GN_PROJECTION_LATLONG) {
-        if (y < 0 || y >= height) {
-            y = y < 0 ? 0 : height - 1;
-            x += width / 2;
-        }
-        x = ((x % width) + width) % width;
-    }
-    if (x < 0 || x >= width || y < 0 || y >= height)
+    int at[2] = {home[0], home[1]};
+    if (!gn_projection_step(&map->projection, dx, dy, at) ||
+        !(map->solid_angle[(size_t)at[1] * (size_t)map->radiance.width + (size_t)at[0]] > 0))
         return;
-    if (!(map->solid_angle[(size_t)y * (size_t)width + (size_t)x] > 0))
-        return;
-    const float *l = gn_image_at(&map->radiance, x, y);
+    const float *l = gn_image_at(&map->radiance, at[0], at[1]);
     for (int c = 0; c < 3; c++)
         sum[c] += weight * (double)l[c];
     sum[3] += weight;
@@ -390,11 +380,12 @@ void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,
         dir[c] = m[c] * (double)dir_world[0] + m[3 + c] * (double)dir_world[1] +
                  m[6 + c] * (double)dir_world[2];
     if (gn_projection_get_position(&map->projection, dir, xy)) {
-        double x = xy[0] - 0.5, y = xy[1] - 0.5, x0 = floor(x), y0 = floor(y);
-        double tx = x - x0, ty = y - y0;
+        int home[2] = {(int)fmin(xy[0], map->radiance.width - 1),
+                       (int)fmin(xy[1], map->radiance.height - 1)};
+        double x = xy[0] - home[0] - 0.5, y = xy[1] - home[1] - 0.5; // from the texel's centre
         for (int i = 0; i < 4; i++)
-            add_tap(map, (int)x0 + i % 2, (int)y0 + i / 2,
-                    (i % 2 ? tx : 1 - tx) * (i / 2 ? ty : 1 - ty), sum);
+            add_tap(map, home, i % 2 ? (x < 0 ? -1 : 1) : 0, i / 2 ? (y < 0 ? -1 : 1) : 0,
+                    (i % 2 ? fabs(x) : 1 - fabs(x)) * (i / 2 ? fabs(y) : 1 - fabs(y)), sum);
     }
     for (int c = 0; c < 3; c++)
         out_radiance[c] = sum[3] > 0 ? (float)(sum[c] / sum[3]) : map->fill[c];

@@ -20,6 +20,8 @@ static const double pi = 3.14159265358979323846;
 static struct gn_projection make(enum gn_projection_type type, int width, int height)
 {
     struct gn_projection p = {.type = type, .width = width, .height = height};
+    if (type == GN_PROJECTION_CUBE)
+        p.height = 6 * width;
     if (type == GN_PROJECTION_FISHEYE_KANNALA_BRANDT)
         memcpy(p.k, (double[4]){0.05, -0.02, 0.004, -0.0005}, sizeof(p.k));
     const char *reason = NULL;
@@ -46,7 +48,7 @@ static void test_radial_axes(void **state)
 {
     (void)state;
     for (int t = GN_PROJECTION_ANGULAR; t < GN_PROJECTION_COUNT; t++) {
-        if (t == GN_PROJECTION_MIRRORBALL)
+        if (t == GN_PROJECTION_MIRRORBALL || !gn_projection_is_radial((enum gn_projection_type)t))
             continue;
         struct gn_projection p = make((enum gn_projection_type)t, 300, 200);
         double side = t == GN_PROJECTION_ANGULAR ? 50 : 100; // px where theta is pi/2
@@ -94,6 +96,86 @@ static void test_latlong_axes(void **state)
     assert_true(xy[0] == 0);
 }
 
+/* What OpenEXR's ImfEnvmap.h draws, its y turned up to our z, its z to our x: the middle of each
+ * face, what lies right of it and above. */
+static void test_cube_axes(void **state)
+{
+    (void)state;
+    static const double middle[6][3] = {{0, 1, 0},  {0, -1, 0}, {0, 0, 1},
+                                        {0, 0, -1}, {1, 0, 0},  {-1, 0, 0}};
+    static const double right[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0},
+                                       {0, 1, 0}, {0, -1, 0}, {0, 1, 0}};
+    static const double up[6][3] = {{0, 0, 1},  {0, 0, 1}, {1, 0, 0},
+                                    {-1, 0, 0}, {0, 0, 1}, {0, 0, 1}};
+    struct gn_projection p = make(GN_PROJECTION_CUBE, 100, 0);
+    for (int f = 0; f < 6; f++) {
+        const double *m = middle[f], *r = right[f], *u = up[f];
+        double y = 100 * f + 50, s = 0.6, l = sqrt(1 + s * s);
+        assert_direction(&p, 50, y, m[0], m[1], m[2]);
+        assert_direction(&p, 80, y, (m[0] + s * r[0]) / l, (m[1] + s * r[1]) / l,
+                         (m[2] + s * r[2]) / l);
+        assert_direction(&p, 50, y - 30, (m[0] + s * u[0]) / l, (m[1] + s * u[1]) / l,
+                         (m[2] + s * u[2]) / l);
+    }
+}
+
+/* The middle, the sides, a corner, the equator's diamond; every quadrant the mirror of the next. */
+static void test_octahedral_axes(void **state)
+{
+    (void)state;
+    struct gn_projection p = make(GN_PROJECTION_OCTAHEDRAL, 200, 200);
+    double d[3], e[3], h = sqrt(0.5);
+    assert_direction(&p, 100, 100, 0, 0, 1);
+    assert_direction(&p, 200, 100, 1, 0, 0);
+    assert_direction(&p, 0, 100, -1, 0, 0);
+    assert_direction(&p, 100, 200, 0, 1, 0);
+    assert_direction(&p, 100, 0, 0, -1, 0);
+    assert_direction(&p, 150, 150, h, h, 0);
+    assert_true(gn_projection_get_direction(&p, 200, 0, d));
+    assert_true(d[2] == -1);
+    for (int i = 0; i < 100; i++) { // the halves of each side show the same directions
+        assert_true(gn_projection_get_direction(&p, 0, i, d));
+        assert_true(gn_projection_get_direction(&p, 0, 200 - i, e));
+        assert_true(hypot(hypot(d[0] - e[0], d[1] - e[1]), d[2] - e[2]) < 1e-12);
+    }
+    /* Near the poles the position keeps its digits, where 1 - z has none left. */
+    double xy[2], tiny = 1e-12;
+    assert_true(gn_projection_get_position(&p, (double[3]){tiny, 0, 1}, xy));
+    assert_true(fabs((xy[0] - 100) / 100 - tiny * h) < 1e-15);
+}
+
+/* A step leads to the pixel that is beside it on the sphere. */
+static void test_steps(void **state)
+{
+    (void)state;
+    for (int t = 0; t < GN_PROJECTION_COUNT; t++) {
+        struct gn_projection p = make((enum gn_projection_type)t, 64, 64);
+        int n_refused = 0;
+        for (int i = 0; i < p.width * p.height * 9; i++) {
+            int home[2] = {i / 9 % p.width, i / 9 / p.width}, at[2] = {home[0], home[1]};
+            double d[3], e[3];
+            if (!gn_projection_step(&p, i % 3 - 1, i / 3 % 3 - 1, at)) {
+                n_refused++;
+                assert_true(at[0] == home[0] && at[1] == home[1]);
+                continue;
+            }
+            assert_true(at[0] >= 0 && at[0] < p.width && at[1] >= 0 && at[1] < p.height);
+            if (!gn_projection_get_direction(&p, home[0] + 0.5, home[1] + 0.5, d) ||
+                !gn_projection_get_direction(&p, at[0] + 0.5, at[1] + 0.5, e))
+                continue;
+            double apart = hypot(hypot(d[0] - e[0], d[1] - e[1]), d[2] - e[2]);
+            if (!(apart < (t == GN_PROJECTION_MIRRORBALL ? 0.6 : 0.26))) // the widest, at a rim
+                fail_msg("%s: %d %d and %d %d are %g apart", gn_projection_get_name(p.type),
+                         home[0], home[1], at[0], at[1], apart);
+        }
+        int n_edge = 4 * 3 * 64 - 4; // steps over the border of a square, its corners' once
+        assert_int_equal(n_refused, t == GN_PROJECTION_LATLONG      ? 0
+                                    : t == GN_PROJECTION_OCTAHEDRAL ? 0
+                                    : t == GN_PROJECTION_CUBE       ? 6 * n_edge
+                                                                    : n_edge);
+    }
+}
+
 /* Every model's radius at 60 degrees, from its formula. */
 static void test_radius_of_models(void **state)
 {
@@ -138,9 +220,8 @@ static void test_round_trip(void **state)
             seed = seed * 6364136223846793005u + 1442695040888963407u;
             double x = (double)(seed >> 40) / (1 << 24) * 512;
             seed = seed * 6364136223846793005u + 1442695040888963407u;
-            double y = (double)(seed >> 40) / (1 << 24) * 256, d[3], e[3], xy[2];
-            bool inside = t == GN_PROJECTION_LATLONG || hypot(x - 256, y - 128) < 0.999 * p.radius;
-            if (!inside)
+            double y = (double)(seed >> 40) / (1 << 24) * p.height, d[3], e[3], xy[2];
+            if (gn_projection_is_radial(p.type) && hypot(x - 256, y - 128) >= 0.999 * p.radius)
                 continue;
             assert_true(gn_projection_get_direction(&p, x, y, d));
             assert_true(fabs(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1) < 1e-12);
@@ -201,6 +282,7 @@ static void test_refusals(void **state)
           .height = 8,
           .theta_max = 3.1415},
          "stereographic"},
+        {{.type = GN_PROJECTION_CUBE, .width = 8, .height = 8}, "six"},
         {{.type = kb, .width = 8, .height = 8, .k = {-0.2}}, "rise"},
         {{.type = kb, .width = 8, .height = 8, .k = {0, 0, 0, INFINITY}}, "rise"},
         /* Falls only in the middle: slope 1 - 3 s + 2.2 s^2 < 0 around s = 0.68. */
@@ -239,10 +321,17 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_radial_axes),  cmocka_unit_test(test_mirrorball_axes),
-        cmocka_unit_test(test_latlong_axes), cmocka_unit_test(test_radius_of_models),
-        cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_outside),
-        cmocka_unit_test(test_refusals),     cmocka_unit_test(test_names),
+        cmocka_unit_test(test_radial_axes),
+        cmocka_unit_test(test_mirrorball_axes),
+        cmocka_unit_test(test_latlong_axes),
+        cmocka_unit_test(test_cube_axes),
+        cmocka_unit_test(test_octahedral_axes),
+        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_radius_of_models),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_outside),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
