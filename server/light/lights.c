@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "server/light/luminance.h"
+#include "server/light/map_geometry.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -24,6 +25,13 @@ void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *ma
     patch->own_spread += energy * w / (4 * pi);
     patch->solid_angle += w;
     patch->n_lit += energy > 0;
+    if (!map->geometry)
+        return;
+    const float *normal = map->geometry->normal + 3 * (size_t)texel;
+    patch->is_placed = true;
+    patch->nearness += energy * (double)map->geometry->nearness[texel];
+    for (int c = 0; c < 3; c++)
+        patch->normal[c] += energy * (double)normal[c];
 }
 
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)
@@ -31,11 +39,14 @@ void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)
     for (int c = 0; c < 3; c++) {
         patch->irradiance[c] += other->irradiance[c];
         patch->toward[c] += other->toward[c];
+        patch->normal[c] += other->normal[c];
     }
     patch->energy += other->energy;
     patch->own_spread += other->own_spread;
     patch->solid_angle += other->solid_angle;
     patch->n_lit += other->n_lit;
+    patch->is_placed = patch->is_placed || other->is_placed;
+    patch->nearness += other->nearness;
 }
 
 bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light)
@@ -56,6 +67,14 @@ bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light
             out_light->dir_world[c] = (float)(v[c] / length);
         out_light->irradiance[c] = (float)patch->irradiance[c];
     }
+    if (!patch->is_placed)
+        return true;
+    double n = sqrt(patch->normal[0] * patch->normal[0] + patch->normal[1] * patch->normal[1] +
+                    patch->normal[2] * patch->normal[2]);
+    out_light->distance =
+        patch->nearness > 0 ? (float)(length * patch->energy / patch->nearness) : INFINITY;
+    for (int c = 0; c < 3 && n > 1e-9 * patch->energy; c++)
+        out_light->normal[c] = (float)(patch->normal[c] / n);
     return true;
 }
 

@@ -19,6 +19,10 @@ struct gn_patch {
     double own_spread;    // of Y dOmega (dOmega / 4 pi): 1 - |mean direction| within the texels
     double solid_angle;   // of dOmega
     int n_lit;            // texels with light
+    // Where the light starts.
+    bool is_placed;   // of a map with geometry (global model)
+    double nearness;  // of Y dOmega / distance
+    double normal[3]; // of Y dOmega n, n the surface's, to the probe's side
 };
 
 /** Adds one texel of the map. */
@@ -27,8 +31,9 @@ void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *ma
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other);
 /**
  * The light of a patch: its irradiance from its energy's centroid, as wide as the disc of even
- * radiance whose mean direction is as long, 1 - |mean| = (1 - cos angular_radius) / 2. False for a
- * black patch.
+ * radiance whose mean direction is as long, 1 - |mean| = (1 - cos angular_radius) / 2. Its distance
+ * is |mean direction| / mean(1 / distance), which for any part of a plane lies on that plane.
+ * False for a black patch.
  */
 bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light);
 

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "server/light/luminance.h"
+#include "server/light/map_geometry.h"
 #include "server/light/map_table.h"
 
 static const double pi = 3.14159265358979323846;
@@ -292,6 +293,10 @@ static int fill_head(const struct gn_environment_frame *frame,
     int rc =
         gn_map_table_create(projection, pose->rotation,
                             options->previous ? options->previous->table : NULL, pool, &map->table);
+    if (rc == 0 && options->model)
+        rc = gn_map_geometry_create(options->model, map->table, pose->translation,
+                                    options->previous ? options->previous->geometry : NULL, pool,
+                                    &map->geometry);
     if (rc < 0)
         return rc;
     map->solid_angle = map->table->solid_angle;
@@ -353,6 +358,7 @@ void gn_radiance_map_unref(struct gn_radiance_map **map)
     if (m->table && pixels)
         pixels = atomic_exchange_explicit(&m->table->spare, pixels, memory_order_acq_rel);
     free(pixels);
+    gn_map_geometry_unref(&m->geometry);
     gn_map_table_unref(&m->table);
     free(m);
 }
@@ -371,8 +377,9 @@ static void add_tap(const struct gn_radiance_map *map, const int home[static 2],
     sum[3] += weight;
 }
 
-void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,
-                                  const float dir_world[static 3], float out_radiance[static 3])
+/* The radiance the map shows there; false: it shows none. */
+static bool look_up_shown(const struct gn_radiance_map *map, const float dir_world[static 3],
+                          float out_radiance[static 3])
 {
     const double *m = map->table->world_from_probe;
     double dir[3], xy[2], sum[4] = {0};
@@ -387,6 +394,22 @@ void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,
             add_tap(map, home, i % 2 ? (x < 0 ? -1 : 1) : 0, i / 2 ? (y < 0 ? -1 : 1) : 0,
                     (i % 2 ? fabs(x) : 1 - fabs(x)) * (i / 2 ? fabs(y) : 1 - fabs(y)), sum);
     }
-    for (int c = 0; c < 3; c++)
-        out_radiance[c] = sum[3] > 0 ? (float)(sum[c] / sum[3]) : map->fill[c];
+    for (int c = 0; c < 3 && sum[3] > 0; c++)
+        out_radiance[c] = (float)(sum[c] / sum[3]);
+    return sum[3] > 0;
+}
+
+void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,
+                                  const float dir_world[static 3], float out_radiance[static 3])
+{
+    if (!look_up_shown(map, dir_world, out_radiance))
+        memcpy(out_radiance, map->fill, sizeof(map->fill));
+}
+
+bool gn_radiance_map_get_radiance_at(const struct gn_radiance_map *map, const float point[static 3],
+                                     float out_radiance[static 3])
+{
+    float dir[3];
+    return map->geometry && gn_map_geometry_sees(map->geometry, point, dir) &&
+           look_up_shown(map, dir, out_radiance);
 }

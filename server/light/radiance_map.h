@@ -46,12 +46,15 @@ struct gn_radiance_map_figures {
     double shown_irradiance[3]; // sum over the shown part of L dOmega, W/m^2
 };
 
-struct gn_map_table; // server/light/map_table.h
+struct gn_map_geometry; // server/light/map_geometry.h
+struct gn_map_table;    // server/light/map_table.h
+struct gn_scene;        // server/scene/scene.h
 
 /** Thread-safety: immutable after create; shared (ref). */
 struct gn_radiance_map {
     _Atomic int references;
-    struct gn_map_table *table; // shared (ref) by the maps of one stream
+    struct gn_map_table *table;       // shared (ref) by the maps of one stream
+    struct gn_map_geometry *geometry; // shared (ref) too; NULL: local model, all light is distant
     struct gn_projection projection;
     struct gn_image radiance;     // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
     const float *solid_angle;     // [height][width] sr, 0 outside the valid circle; the table's
@@ -70,9 +73,12 @@ struct gn_radiance_map {
 struct gn_radiance_map_options {
     float ground_albedo; // of the fill below a fisheye's horizon, [0, 1], default 0.2 where 0
     bool no_fill;        // directions not shown are black
+    const struct gn_scene *model; // borrowed until the map is freed: the global model, light starts
+                                  // at its real objects; NULL (default): all light is distant
     const struct gn_radiance_map *previous; // borrowed during the call, may be NULL: the last map
                                             // of the stream. Where projection and orientation
-                                            // agree its table, and freed pixels, are used again
+                                            // agree its table, and freed pixels, are used again;
+                                            // where the position does too, its geometry
 };
 
 /**
@@ -91,5 +97,12 @@ void gn_radiance_map_unref(struct gn_radiance_map **map);
 /** Radiance[3] from unit world direction, bilinear; the fill where the map does not show it. */
 void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,
                                   const float dir_world[static 3], float out_radiance[static 3]);
+/**
+ * Radiance[3] that the probe measured of a point, m, on a surface of the global model: from the
+ * direction of the point. False, and nothing is written, where the map has no geometry, the probe
+ * does not see the point past other real surfaces, or the map does not show that direction.
+ */
+bool gn_radiance_map_get_radiance_at(const struct gn_radiance_map *map, const float point[static 3],
+                                     float out_radiance[static 3]);
 
 #endif

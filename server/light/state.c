@@ -3,12 +3,14 @@
 #include "server/light/state.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/clock.h"
 #include "server/light/luminance.h"
+#include "server/light/map_geometry.h"
 #include "server/light/method.h"
 #include "server/light/sh.h"
 
@@ -61,6 +63,24 @@ static const struct gn_light_memory *recall(const struct gn_lighting_state *stat
     return previous->memory;
 }
 
+/* Where the method did not say it, lights start at the surface in their direction; none starts
+ * behind that surface, where it would be hidden from everywhere. */
+static void place_lights(struct gn_lighting_state *state)
+{
+    const struct gn_map_geometry *geometry = state->map->geometry;
+    for (int i = 0; i < state->n_lights && geometry; i++) {
+        struct gn_light *light = &state->lights[i];
+        float distance, normal[3];
+        if (light->distance == INFINITY)
+            continue;
+        gn_map_geometry_look(geometry, light->dir_world, &distance, normal);
+        if (light->distance == 0)
+            memcpy(light->normal, normal, sizeof(normal));
+        if (light->distance == 0 || distance < light->distance)
+            light->distance = distance;
+    }
+}
+
 static int make_lights(struct gn_lighting_state *state, const struct gn_light_options *options,
                        struct gn_pool *pool, struct gn_error *out_error)
 {
@@ -88,6 +108,8 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     }
     if (rc == 0)
         rc = take_lights(state, &list);
+    if (rc == 0)
+        place_lights(state);
     gn_light_list_finish(&list);
     return rc < 0 ? gn_error_set(out_error, rc, "lights: no memory") : 0;
 }
@@ -166,6 +188,8 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
     if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
         return;
     gn_light_memory_destroy(&s->memory);
+    for (int i = 0; i < s->n_others; i++)
+        gn_lighting_state_unref(&s->others[i]);
     gn_partition_plan_unref(&s->plan);
     gn_radiance_map_unref(&s->map);
     free(s->lights);

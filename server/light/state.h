@@ -13,14 +13,22 @@
 struct gn_light_memory;   // server/light/lights.h
 struct gn_partition_plan; // server/light/partition_plan.h
 
+/** Most probes that light a room together. */
+#define GN_PROBES_MAX 8
 /** Most lights a state may hold. */
 #define GN_LIGHTS_MAX 4096
 
-/** A distant light. */
+/**
+ * A light as the probe sees it: distant, or (global model) a piece of a real surface at
+ * map->world_from_probe.translation + distance dir_world that shines by Lambert's law.
+ */
 struct gn_light {
-    float dir_world[3];   // unit, towards the light
+    float dir_world[3];   // unit, from the probe towards the light
     float angular_radius; // rad, of the disc as spread out as the light's region; 0: unknown
-    float irradiance[3];  // RGB at normal incidence, W/m^2
+    float irradiance[3];  // RGB at normal incidence, at the probe, W/m^2
+    float distance;       // m, of the piece's middle from the probe; INFINITY: distant; 0: the
+                          // method left it to gn_lighting_state_create(), local model: distant
+    float normal[3];      // of the piece, to the probe's side, unit; 0: not known, or distant
     uint64_t id;          // its own in the state; the same light in the stream's next; 0: none
 };
 
@@ -111,7 +119,10 @@ struct gn_lighting_state {
     struct gn_partition_plan *plan; // which texel lies in which base region; shared (ref), may be
                                     // NULL
     struct gn_light_memory *memory; // what the method keeps for the next frame; owned, may be NULL
-    uint64_t sequence;              // of the environment frame
+    int n_others;                   // [0, GN_PROBES_MAX - 1]: lights of the room's other probes
+    struct gn_lighting_state *others[GN_PROBES_MAX - 1]; // [n_others] shared (ref), themselves
+                                                         // without others; see server/light/blend.h
+    uint64_t sequence;                                   // of the environment frame
     int64_t capture_time_ns;
     int64_t published_time_ns;
     double ms_map, ms_sh, ms_lights; // time spent, ms

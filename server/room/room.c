@@ -64,6 +64,8 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
     room->figures.n_objects = room->scene->n_objects;
     room->figures.n_real_triangles = room->scene->n_real_triangles;
     room->figures.n_virtual_triangles = room->scene->n_virtual_triangles;
+    if (room->scene->model == GN_MODEL_GLOBAL)
+        room->options.map.model = room->scene;
     rc = gn_frame_maker_create(&room->options, room->scene, &room->maker, &scene_error);
     if (rc < 0) {
         gn_error_set(out_error, rc, "room %s: %s", room->name, scene_error.text);

@@ -179,7 +179,9 @@ static int read_objects(const struct gn_json *array, struct gn_scene_object *obj
 int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene **out_scene,
                        struct gn_error *out_error)
 {
-    static const char *const keys[] = {"objects", "lights"};
+    static const char *const keys[] = {"objects", "lights", "model"};
+    static const char *const models[] = {"local", "global"}; // as enum gn_scene_model
+    int model = GN_MODEL_LOCAL;
     struct gn_json root = {0};
     struct gn_json array = {0};
     struct gn_scene_object *objects = NULL;
@@ -190,6 +192,8 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
         ret = gn_json_check_keys(&root, keys, LENGTH(keys), out_error);
     if (ret == 0)
         ret = check_lights(&root, out_error);
+    if (ret == 0 && gn_json_has(&root, "model"))
+        ret = gn_json_get_enum(&root, "model", models, LENGTH(models), &model, out_error);
     if (ret == 0)
         ret = gn_json_get_array(&root, "objects", 1, GN_SCENE_MAX_OBJECTS, &array, out_error);
     if (ret < 0)
@@ -207,6 +211,8 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
     ret = gn_scene_create(objects, n_objects, pool, out_scene, &reason);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", path, reason.text);
+    else
+        (*out_scene)->model = (enum gn_scene_model)model;
 out:
     for (int i = 0; objects && i < n_objects; i++) { // zeroed where the scene took them
         free(objects[i].name);

@@ -21,6 +21,12 @@
 
 enum gn_material_type { GN_MATERIAL_DIFFUSE = 0, GN_MATERIAL_MIRROR = 1 };
 
+/** How real light reaches the scene (the paper's sections 3.2 and 3.1). */
+enum gn_scene_model {
+    GN_MODEL_LOCAL = 0,  // all light is distant
+    GN_MODEL_GLOBAL = 1, // what probes see of the real objects starts at them
+};
+
 /** What an object is made of. */
 struct gn_material {
     enum gn_material_type type;
@@ -40,6 +46,7 @@ struct gn_scene_object {
 
 /** Thread-safety: immutable after create. */
 struct gn_scene {
+    enum gn_scene_model model;
     int n_objects;
     struct gn_scene_object *objects; // [n_objects], owned; index = object id in rt
     struct gn_rt *rt;                // owned, committed
@@ -51,7 +58,8 @@ struct gn_scene {
  * Reads scene.json (docs/frames.md) and all meshes, and commits:
  *   {"objects": [{"mesh": "a.obj", "role": "virtual" or "real", "name": "a",
  *                 "material": {"type": "diffuse" or "mirror", "albedo": [r, g, b]},
- *                 "world_from_object": [16 numbers, row-major]}], "lights": []}
+ *                 "world_from_object": [16 numbers, row-major]}], "lights": [],
+ *    "model": "local" (default) or "global"}
  * Only mesh and role must be there. Paths are relative to the file. Without a material, or with a
  * diffuse one without albedo, the mesh's own colours count, or 0.5; a mirror's albedo is 1 unless
  * said. The matrix may scale, shear and mirror; absent, it is the identity. An unknown key, role or
