@@ -8,6 +8,7 @@
 
 #include <stdint.h>
 
+#include "server/light/emitters.h"
 #include "server/light/radiance_map.h"
 
 struct gn_light_memory;   // server/light/lights.h
@@ -112,9 +113,12 @@ struct gn_lighting_state {
     bool has_sh;
     double sh[9][3]; // L_lm of the radiance in world axes, order 00 1-1 10 11 2-2 2-1 20 21 22
     int n_lights;
-    struct gn_light *lights;    // [n_lights], owned; by falling luminance
-    double total_irradiance[3]; // sum over the sphere, fill included, of L dOmega, W/m^2: what
-                                // the lights add up to (seed: they do not)
+    struct gn_light *lights; // [n_lights], owned; by falling luminance
+    int n_near;
+    struct gn_near_light *near;   // [n_near], owned; those of `emission` that give light
+    struct gn_emission *emission; // pictures on emitters; shared (ref), may be NULL: no near light
+    double total_irradiance[3];   // sum over the sphere, fill included, of L dOmega, W/m^2: what
+                                  // the lights add up to (seed: they do not)
     struct gn_light_figures figures;
     struct gn_partition_plan *plan; // which texel lies in which base region; shared (ref), may be
                                     // NULL
@@ -134,6 +138,18 @@ GN_MUST_USE int gn_lighting_state_create(const struct gn_environment_frame *fram
                                          const struct gn_light_options *options,
                                          struct gn_pool *pool, struct gn_lighting_state **out_state,
                                          struct gn_error *out_error);
+/**
+ * A state of near light only, for a room without a probe: its map is black, sequence 0. options as
+ * above, with their emission. Returns 0 or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_lighting_state_create_dark(const struct gn_light_options *options,
+                                              int64_t capture_time_ns,
+                                              struct gn_lighting_state **out_state,
+                                              struct gn_error *out_error);
+/** The same state with other near light (may be NULL); shares the map. 0 or -ENOMEM. */
+GN_MUST_USE int gn_lighting_state_replace_emission(const struct gn_lighting_state *state,
+                                                   struct gn_emission *emission,
+                                                   struct gn_lighting_state **out_state);
 struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state);
 /** NULL-safe; nulls *state. */
 void gn_lighting_state_unref(struct gn_lighting_state **state);

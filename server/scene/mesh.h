@@ -21,6 +21,7 @@ struct gn_mesh {
     int n_triangles;
     float *positions;    // [n_vertices][3], finite
     float *normals;      // [n_vertices][3], unit; may be NULL: flat
+    float *uvs;          // [n_vertices][2], v upwards, as the file has them; may be NULL: none
     uint32_t *triangles; // [n_triangles][3], each < n_vertices; counter-clockwise seen from outside
     float *albedos;      // [n_triangles][3], [0, 1]; may be NULL: the object's material
 };
@@ -39,9 +40,10 @@ GN_MUST_USE int gn_mesh_check(struct gn_mesh *mesh, int *out_dropped, struct gn_
  * into triangles, node transforms applied, points and lines left out. Normals are the file's own,
  * and where it has none the mesh is flat: nothing is smoothed by guess. Unusable normals (zero, not
  * finite) become the mean of their triangles'. Albedos are the materials' diffuse or base colours,
- * taken as linear Rec.709; NULL where the file has no material. Textures and vertex colours are not
- * read. Returns 0 or a negative errno and a sentence naming the file: not finite, empty, too large,
- * a colour outside [0, 1], a kind of file that is not read.
+ * taken as linear Rec.709; NULL where the file has no material. Texture coordinates are
+ * kept (the first set; v = 0 is the picture's bottom edge), textures and vertex colours not read.
+ * Returns 0 or a negative errno and a sentence naming the file: not finite, empty, too large, a
+ * colour outside [0, 1], a kind of file that is not read.
  */
 GN_MUST_USE int gn_mesh_read_file(const char *path, struct gn_mesh *out_mesh,
                                   struct gn_error *out_error);

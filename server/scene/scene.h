@@ -27,6 +27,15 @@ enum gn_scene_model {
     GN_MODEL_GLOBAL = 1, // what probes see of the real objects starts at them
 };
 
+/** Most objects that send light. */
+#define GN_SCENE_MAX_EMITTERS 512
+/** Most lights of the scene's list. */
+#define GN_SCENE_MAX_LIGHTS 1024
+/** Largest emission, W/(sr m^2), and intensity, W/sr. */
+#define GN_SCENE_MAX_EMISSION 1e12
+/** Longest name of a stream. */
+#define GN_SCENE_MAX_STREAM 63
+
 /** What an object is made of. */
 struct gn_material {
     enum gn_material_type type;
@@ -39,9 +48,26 @@ struct gn_scene_object {
     enum gn_rt_set role; // GN_RT_REAL or GN_RT_VIRTUAL
     struct gn_material material;
     bool has_material; // false: the mesh's own albedos, or diffuse 0.5
+    /**
+     * Radiance that it sends from its outside, W/(sr m^2), >= 0; diffuse objects only. With a
+     * stream: what it sends while there is no picture. The outside is where triangles are seen
+     * counter-clockwise in the mesh, also where the matrix mirrors.
+     */
+    float emission[3];
+    char *emission_stream; // name of the pictures laid over the mesh's uvs; owned, may be NULL
+    float emission_scale;  // W/(sr m^2) of a linear picture value of 1, > 0; with a stream
     double world_from_object[16];
     double normal_matrix[9]; // inverse transpose of the 3x3 part, row-major, for shading normals
+    bool is_mirrored;        // the matrix turns the winding round; filled by gn_scene_create
     struct gn_mesh mesh;     // owned
+};
+
+/** A lamp of the scene's list: it sends alike all around. */
+struct gn_scene_light {
+    double position[3];  // m, world, each at most GN_RT_MAX_COORDINATE
+    float intensity[3];  // W/sr, [0, GN_SCENE_MAX_EMISSION]
+    float radius;        // m, of its sphere, >= 0: what is nearer to it hides none of it
+    enum gn_rt_set role; // GN_RT_REAL: a lamp of the room; GN_RT_VIRTUAL: its light is added
 };
 
 /** Thread-safety: immutable after create. */
@@ -50,6 +76,8 @@ struct gn_scene {
     int n_objects;
     struct gn_scene_object *objects; // [n_objects], owned; index = object id in rt
     struct gn_rt *rt;                // owned, committed
+    int n_lights;
+    struct gn_scene_light *lights; // [n_lights], owned
     int n_real_triangles;
     int n_virtual_triangles;
 };
@@ -90,6 +118,9 @@ struct gn_surface {
     float albedo[3];
     enum gn_material_type material;
     enum gn_rt_set role;
+    uint32_t object;
+    bool is_front; // seen from the mesh's outside, where it may send light
+    float uv[2];   // the mesh's; 0 where it has none
 };
 
 /** Evaluates a hit of a ray with unit direction dir. Thread-safety: safe. */
