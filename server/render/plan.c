@@ -133,7 +133,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     report->n_plan = N_LINES;
     set_line(report, PRIMARY, NULL, "one ray through each pixel's centre");
     set_line(report, REFINE,
-             frame->rule.grid > 1 ? NULL : "this quality has one ray for each pixel",
+             frame->rule.grid > 1  ? NULL
+             : options->single_ray ? "one ray for each pixel was asked for"
+                                   : "this quality has one ray for each pixel",
              "edges get a grid of rays");
 
     const char *no_virtual = all ? NULL : why_not_virtual(frame, slopes);

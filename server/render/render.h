@@ -36,6 +36,7 @@ struct gn_render_options {
     bool shadow_unweighted;  // the paper's sums without the cosine (SEED implies it)
     bool shadow_ignore_real; // real blockers do not count in the sums (SEED implies it)
     bool all_passes;         // switch every omission of the plan off (for tests)
+    bool single_ray;         // no pixel gets a grid (to compare light alone)
     bool supersample_all;    // every pixel gets its quality's grid (to test the choice of them)
     int bounces;             // reference only: indirect bounces, [0, 16]
     int paths_per_pixel;     // reference with bounces: random paths, [1, 65536], default 256

@@ -406,6 +406,8 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->tiles_x = count_tiles(frame->camera->width);
     frame->tiles_y = count_tiles(frame->camera->height);
     frame->rule = gn_refine_rules[frame->options.quality];
+    if (frame->options.single_ray)
+        frame->rule.grid = 1;
     if (frame->options.quality == GN_QUALITY_SEED)
         frame->options.shadow_unweighted = frame->options.shadow_ignore_real = true;
     if (frame->options.paths_per_pixel == 0)

@@ -83,6 +83,28 @@ static void test_adaptive_grid_is_as_good_as_a_full_one(void **state)
     gn_test_stage_finish(&stage);
 }
 
+static void test_single_ray_is_a_pixels_centre(void **state)
+{
+    (void)state;
+    struct gn_test_stage stage = {0};
+    init_ball(&stage, grey, 6);
+    gn_test_stage_set_map(&stage, 96, 48, paint_lamps, NULL);
+    for (int quality = 0; quality <= GN_QUALITY_REFERENCE; quality += GN_QUALITY_REFERENCE) {
+        struct gn_render_options options = {.quality = (enum gn_quality)quality,
+                                            .single_ray = true};
+        gn_test_stage_set_lights_from_map(&stage, 8);
+        gn_test_stage_render(&stage, &options);
+        size_t n = (size_t)stage.layers.width * (size_t)stage.layers.height;
+        assert_int_equal(stage.report.n_refined_pixels, 0);
+        assert_int_equal(stage.report.rays_primary, n);
+        for (size_t i = 0; i < n; i++) {
+            float a = stage.layers.virtual_rgba.data[4 * i + 3];
+            assert_true(a == 0 || a == 1);
+        }
+    }
+    gn_test_stage_finish(&stage);
+}
+
 static void test_edges_are_covered_by_their_area(void **state)
 {
     (void)state;
@@ -217,6 +239,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_adaptive_grid_is_as_good_as_a_full_one),
+        cmocka_unit_test(test_single_ray_is_a_pixels_centre),
         cmocka_unit_test(test_edges_are_covered_by_their_area),
         cmocka_unit_test(test_a_coarse_constant_map_is_exact),
         cmocka_unit_test(test_white_furnace),
