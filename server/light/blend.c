@@ -2,8 +2,48 @@
 /* SPDX-License-Identifier: ISC */
 #include "server/light/blend.h"
 
+#include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
 #include <string.h>
+
+int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int newest,
+                           struct gn_lighting_state **out_state)
+{
+    *out_state = NULL;
+    if (n == 1) {
+        *out_state = gn_lighting_state_ref(states[0]);
+        return 0;
+    }
+    const struct gn_lighting_state *first = states[0], *times = states[newest];
+    struct gn_lighting_state *s = calloc(1, sizeof(*s));
+    if (!s)
+        return -ENOMEM;
+    atomic_init(&s->references, 1);
+    s->lights = malloc((size_t)first->n_lights * sizeof(*s->lights) + 1);
+    if (!s->lights) {
+        gn_lighting_state_unref(&s);
+        return -ENOMEM;
+    }
+    memcpy(s->lights, first->lights, (size_t)first->n_lights * sizeof(*s->lights));
+    s->n_lights = first->n_lights;
+    s->map = gn_radiance_map_ref(first->map);
+    s->has_sh = first->has_sh;
+    memcpy(s->sh, first->sh, sizeof(s->sh));
+    memcpy(s->total_irradiance, first->total_irradiance, sizeof(s->total_irradiance));
+    s->figures = times->figures;
+    s->sequence = times->sequence;
+    s->capture_time_ns = times->capture_time_ns;
+    s->published_time_ns = times->published_time_ns;
+    s->ms_map = times->ms_map;
+    s->ms_sh = times->ms_sh;
+    s->ms_lights = times->ms_lights;
+    for (int i = 1; i < n; i++)
+        s->others[s->n_others++] = gn_lighting_state_ref(states[i]);
+    *out_state = s;
+    return 0;
+}
 
 void gn_blend_init(struct gn_blend *blend, const struct gn_lighting_state *state)
 {

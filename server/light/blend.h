@@ -9,7 +9,16 @@
 #ifndef GN_SERVER_LIGHT_BLEND_H
 #define GN_SERVER_LIGHT_BLEND_H
 
+#include "proto/attr.h"
 #include "server/light/state.h"
+
+/**
+ * One state of n [1, GN_PROBES_MAX] probes' states, each without others: the first's light with the
+ * rest as its others; its times and figures are those of states[newest]. Of one: that state itself.
+ * The caller keeps its references; *out_state is a new one. Returns 0 or -ENOMEM.
+ */
+GN_MUST_USE int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int newest,
+                                       struct gn_lighting_state **out_state);
 
 /** A state and its others. Borrows the state. Thread-safety: immutable after init. */
 struct gn_blend {

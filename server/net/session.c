@@ -259,7 +259,8 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
     else if (rc == -ENOMEM)
         gn_session_fail(s, GN_MSG_ERROR_CODE_INTERNAL, type, about_id, error.text, now_ns);
     else if (rc < 0)
-        complain(s, GN_MSG_ERROR_CODE_BAD_VALUE, type, about_id, error.text);
+        complain(s, rc == -EUSERS ? GN_MSG_ERROR_CODE_FULL : GN_MSG_ERROR_CODE_BAD_VALUE, type,
+                 about_id, error.text);
 }
 
 static void take_message(struct gn_session *s, const struct gn_conn_message *message,

@@ -59,6 +59,18 @@ struct gn_session_figures {
     double last_latency_ms; // 0: none yet
 };
 
+/** What can be read of one probe that has lit the room. */
+struct gn_probe_figures {
+    uint64_t session_id;
+    bool has_left;      // it is gone, but no other has lit the room since
+    double position[3]; // m, world
+    int n_lights;
+    uint64_t sequence; // of its last frame that gave light
+    uint64_t n_lit;    // such frames
+    int64_t capture_ns;
+    double rate_hz; // such frames per second, by the median of the last intervals; 0: not known yet
+};
+
 /** What the network side counts. */
 struct gn_transport_figures {
     bool is_serving; // between the network's start and the first word of its stop

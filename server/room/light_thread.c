@@ -1,11 +1,13 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-/* The light thread: newest environment frame to published lighting state. */
+/* The light thread: the probes' newest environment frames, in turn, to published lighting states.
+ */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/log.h"
+#include "server/light/blend.h"
 #include "server/room/convert.h"
 #include "server/room/environment.h"
 #include "server/room/lighting_message.h"
@@ -24,26 +26,24 @@ struct subscribers {
 /** What there is to do. */
 struct work {
     bool has_job;
-    struct gn_environment_job job;   // where has_job
-    struct subscribers newcomers;    // who has not been sent the state that is there
-    struct gn_lighting_state *light; // a reference where newcomers.n > 0
+    struct gn_environment_job job;      // where has_job
+    struct gn_lighting_state *previous; // a reference: the last state of the job's probe, or NULL
+    bool is_stale;                      // a probe has left: the others' lights are to be joined
+    struct subscribers newcomers;       // who has not been sent the states that are there
+    int n_lights;                       // > 0 where newcomers.n > 0
+    struct gn_lighting_state *lights[GN_PROBES_MAX]; // references: each probe's
 };
 
 /**
- * A frame rests in its slot while nobody needs light. But until light was made from one frame of a
+ * Frames rest in their slots while nobody needs light. But until light was made from one frame of a
  * probe, its frames are worked on: it is told what is wrong with them though nobody looks.
  */
-static bool is_frame_due_locked(struct gn_room *room) GN_REQUIRES(room->mu)
+static bool is_light_wanted_locked(struct gn_room *room) GN_REQUIRES(room->mu)
 {
-    if (!room->has_environment)
-        return false;
     if (room->n_viewers > 0 || room->n_subscribers > 0)
         return true;
-    if (room->light_asked_ns > 0 &&
-        gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS)
-        return true;
-    const struct gn_room_session *probe = gn_room_find_locked(room, room->environment.session_id);
-    return probe && !probe->has_lit;
+    return room->light_asked_ns > 0 &&
+           gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
 }
 
 /** Lists all subscribers, or those that were told nothing yet; counts them as told. */
@@ -70,19 +70,18 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
     while (!room->is_stopping) {
         if (room->light)
             take_subscribers_locked(room, true, &out->newcomers);
+        int newest;
         if (out->newcomers.n > 0)
-            out->light = gn_lighting_state_ref(room->light);
-        out->has_job = is_frame_due_locked(room);
-        if (out->has_job) {
-            out->job = room->environment;
-            room->has_environment = false;
-        }
-        if (out->has_job || out->light)
+            out->n_lights = gn_probes_get_lights(&room->probes, out->lights, &newest);
+        out->has_job =
+            gn_probes_take(&room->probes, is_light_wanted_locked(room), &out->job, &out->previous);
+        out->is_stale = room->is_light_stale;
+        if (out->has_job || out->n_lights > 0 || out->is_stale)
             break;
         gn_cond_wait(&room->light_wake, &room->mu);
     }
     gn_mutex_unlock(&room->mu);
-    return out->has_job || out->light;
+    return out->has_job || out->n_lights > 0 || out->is_stale;
 }
 
 /** Tells the probe what is wrong with its frame. */
@@ -138,41 +137,71 @@ static void tell_subscribers(struct gn_room *room, const struct gn_lighting_stat
     gn_buf_unref(&payloads[1]);
 }
 
-/** Makes the state the room's; takes the reference. */
+static void unref_all(struct gn_lighting_state **lights, int n)
+{
+    for (int i = 0; i < n; i++)
+        gn_lighting_state_unref(&lights[i]);
+}
+
+/** Makes the light of all probes the room's. */
+static void join_lights(struct gn_room *room)
+{
+    struct gn_lighting_state *lights[GN_PROBES_MAX], *joined;
+    int newest, n_lights = 0;
+    gn_mutex_lock(&room->mu);
+    int n = gn_probes_get_lights(&room->probes, lights, &newest);
+    room->is_light_stale = false; // a probe that leaves from here on makes it so again
+    gn_mutex_unlock(&room->mu);
+    if (n == 0)
+        return;
+    for (int i = 0; i < n; i++)
+        n_lights += lights[i]->n_lights;
+    int rc = gn_lighting_state_join(lights, n, newest, &joined);
+    if (rc == 0) {
+        gn_mutex_lock(&room->mu);
+        struct gn_lighting_state *old = room->light;
+        room->light = joined;
+        room->figures.has_light = true;
+        room->figures.light_sequence = joined->sequence;
+        room->figures.light_capture_ns = joined->capture_time_ns;
+        room->figures.n_lights = n_lights;
+        gn_cond_signal(&room->render_wake);
+        gn_mutex_unlock(&room->mu);
+        gn_lighting_state_unref(&old);
+    } else {
+        gn_log(GN_LOG_WARN, "room %s: the lights of %d probes not joined: %s", room->name, n,
+               strerror(-rc));
+    }
+    unref_all(lights, n);
+}
+
+/** Makes the state its probe's light; takes the reference. */
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
                     double ms_decode)
 {
     struct subscribers subscribers;
-    struct gn_lighting_state *mine = gn_lighting_state_ref(state);
+    struct gn_lighting_state *mine = gn_lighting_state_ref(state), *old[GN_PROBES_MAX];
+    int n_old;
     gn_mutex_lock(&room->mu);
-    struct gn_lighting_state *old = room->light;
-    room->light = state;
+    gn_probes_set_light(&room->probes, probe_id, state, gn_clock_get_monotonic_ns(), old, &n_old);
     struct gn_room_figures *f = &room->figures;
-    f->has_light = true;
     f->light_published++;
-    f->light_sequence = mine->sequence;
-    f->light_capture_ns = mine->capture_time_ns;
-    f->n_lights = mine->n_lights;
     f->light_ms_decode = ms_decode;
     f->light_ms_map = mine->ms_map;
     f->light_ms_sh = mine->ms_sh;
     f->light_ms_lights = mine->ms_lights;
-    struct gn_room_session *probe = gn_room_find_locked(room, probe_id);
-    if (probe)
-        probe->has_lit = true;
     take_subscribers_locked(room, false, &subscribers);
-    gn_cond_signal(&room->render_wake);
     gn_mutex_unlock(&room->mu);
-    gn_lighting_state_unref(&old);
+    unref_all(old, n_old);
+    join_lights(room);
     if (subscribers.n > 0)
         tell_subscribers(room, mine, &subscribers);
     gn_lighting_state_unref(&mine);
 }
 
-/** From one frame to the room's light. *previous: the last state made, whose tables are used again;
- * the new one takes its place. */
+/** From one frame to its probe's light. previous: its last state, whose tables are used again. */
 static void make_light(struct gn_room *room, struct gn_environment_decoder *decoder,
-                       struct gn_environment_job *job, struct gn_lighting_state **previous)
+                       struct gn_environment_job *job, const struct gn_lighting_state *previous)
 {
     struct gn_error error = {0};
     struct gn_environment_frame frame;
@@ -182,17 +211,14 @@ static void make_light(struct gn_room *room, struct gn_environment_decoder *deco
                      : gn_error_set(&error, -ENOMEM, "out of memory");
     double ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
     struct gn_light_options options = room->options.light;
-    options.previous = *previous;
+    options.previous = previous;
     if (rc == 0)
         rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
                                       &state, &error);
-    if (rc < 0) {
+    if (rc < 0)
         refuse(room, job, rc, error.text);
-    } else {
-        gn_lighting_state_unref(previous);
-        *previous = gn_lighting_state_ref(state);
+    else
         publish(room, job->session_id, state, ms_decode);
-    }
     gn_buf_unref(&job->payload);
 }
 
@@ -200,16 +226,17 @@ void gn_room_run_light(void *context)
 {
     struct gn_room *room = context;
     struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
-    struct gn_lighting_state *previous = NULL;
     struct work work;
     while (wait_for_work(room, &work)) {
-        if (work.light)
-            tell_subscribers(room, work.light, &work.newcomers);
-        gn_lighting_state_unref(&work.light);
+        if (work.is_stale)
+            join_lights(room);
+        for (int i = 0; i < work.n_lights; i++)
+            tell_subscribers(room, work.lights[i], &work.newcomers);
+        unref_all(work.lights, work.n_lights);
         if (work.has_job)
-            make_light(room, decoder, &work.job, &previous);
+            make_light(room, decoder, &work.job, work.previous);
+        gn_lighting_state_unref(&work.previous);
     }
-    gn_lighting_state_unref(&previous);
     if (decoder)
         gn_environment_decoder_finish(decoder);
     free(decoder);

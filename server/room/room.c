@@ -100,8 +100,7 @@ void gn_room_destroy(struct gn_room **room)
     gn_mutex_unlock(&r->mu);
     gn_thread_join(&r->light_thread);
     gn_thread_join(&r->render_thread);
-    if (r->has_environment)
-        gn_buf_unref(&r->environment.payload);
+    gn_probes_finish(&r->probes);
     gn_lighting_state_unref(&r->light);
     gn_snapshot_unref(&r->composite);
     if (r->scheduler)
@@ -190,9 +189,15 @@ void gn_room_leave(struct gn_room_session **session)
     room->n_subscribers -= s->want_lighting_states;
     if (s->slot >= 0)
         had_frame = gn_scheduler_remove(room->scheduler, s->slot, &job);
+    struct gn_lighting_state *light = gn_probes_leave(&room->probes, s->id);
+    if (light) {
+        room->is_light_stale = true;
+        gn_cond_signal(&room->light_wake);
+    }
     gn_mutex_unlock(&room->mu);
     if (had_frame)
         gn_room_drop(room, &job, GN_MSG_DROP_REASON_SESSION_ENDED, "the session ended");
+    gn_lighting_state_unref(&light);
     free(s);
     *session = NULL;
 }
@@ -355,14 +360,15 @@ int gn_room_put_environment(struct gn_room_session *session,
     gn_mutex_lock(&room->mu);
     room->figures.environment_in++;
     session->figures.environment_in++;
-    if (room->has_environment) {
-        superseded = room->environment;
-        room->figures.environment_superseded++;
-    }
-    room->environment = job;
-    room->has_environment = true;
+    int rc = gn_probes_put(&room->probes, &job, &superseded);
+    room->figures.environment_superseded += rc == 1;
+    room->figures.environment_refused += rc < 0;
     gn_cond_signal(&room->light_wake);
     gn_mutex_unlock(&room->mu);
     gn_buf_unref(&superseded.payload);
-    return 0;
+    if (rc >= 0)
+        return 0;
+    gn_buf_unref(&job.payload);
+    return gn_error_set(out_error, rc, "room %s is lit by %d probes, it takes no more", o->name,
+                        GN_PROBES_MAX);
 }

@@ -71,10 +71,10 @@ GN_MUST_USE int gn_room_join(struct gn_room *room, const struct gn_room_member *
 void gn_room_leave(struct gn_room_session **session);
 
 /**
- * The newest environment frame replaces an unread one. Decoding is left to the light thread, which
- * posts an ERROR where the pixels are bad. payload: the caller's reference stays the caller's.
- * Returns 0, or -EINVAL and a sentence (sizes that do not fit, not built), -EDOM (sequence not
- * rising), -ENOMEM.
+ * The probe's newest environment frame replaces its unread one. Decoding is left to the light
+ * thread, which posts an ERROR where the pixels are bad. payload: the caller's reference stays the
+ * caller's. Returns 0, or -EINVAL and a sentence (sizes that do not fit, not built), -EUSERS
+ * (GN_PROBES_MAX probes light the room), -EDOM (sequence not rising), -ENOMEM.
  */
 GN_MUST_USE int gn_room_put_environment(struct gn_room_session *session,
                                         const struct gn_msg_environment_frame *frame,
@@ -108,6 +108,10 @@ void gn_room_get_statistics(struct gn_room *room, struct gn_msg_statistics *out_
 void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figures);
 /** Up to cap sessions' figures; returns how many. */
 int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_sessions, int cap);
+
+/** The probes that have lit the room; returns how many. */
+int gn_room_get_probes(struct gn_room *room,
+                       struct gn_probe_figures out_probes[static GN_PROBES_MAX]);
 
 /** The published lighting state, a reference for the caller; NULL: none yet. */
 struct gn_lighting_state *gn_room_get_light(struct gn_room *room);

@@ -10,6 +10,7 @@
 #include "common/clock.h"
 #include "common/thread.h"
 #include "server/room/frame.h"
+#include "server/room/probes.h"
 #include "server/room/room.h"
 #include "server/room/scheduler.h"
 
@@ -18,13 +19,6 @@
 
 /** Most sessions of a room that get lighting states; one more is not let in. */
 #define GN_ROOM_MAX_SUBSCRIBERS 64
-
-/** An environment frame as it waits. */
-struct gn_environment_job {
-    uint64_t session_id;
-    struct gn_msg_environment_frame frame;
-    struct gn_buf *payload; // owned reference
-};
 
 struct gn_room_session {
     struct gn_room *room;
@@ -41,7 +35,6 @@ struct gn_room_session {
     struct gn_pose world_from_camera;
     uint64_t last_frame_id, last_environment_sequence;
 
-    bool has_lit;  // guarded by room->mu: light was made from one of its environment frames
     bool was_told; // guarded by room->mu: it was sent a lighting state, or is about to be
     struct gn_session_figures figures; // guarded by room->mu
 };
@@ -62,9 +55,9 @@ struct gn_room {
     struct gn_room_session *sessions;
     int n_viewers, n_probes, n_subscribers;
     struct gn_scheduler *scheduler;
-    bool has_environment;
-    struct gn_environment_job environment;      // where has_environment
-    struct gn_lighting_state *light;            // a reference; NULL: none yet
+    struct gn_probes probes;
+    bool is_light_stale;             // a probe has left: the others' lights are to be joined anew
+    struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
     int64_t light_asked_ns, composite_asked_ns; // when the page last looked; 0: never
     struct gn_snapshot *composite;              // a reference; NULL: nobody looks
     struct gn_room_figures figures;

@@ -32,7 +32,7 @@ void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figur
     *out_figures = room->figures;
     out_figures->n_viewers = room->n_viewers;
     out_figures->n_probes = room->n_probes;
-    out_figures->has_environment_waiting = room->has_environment;
+    out_figures->has_environment_waiting = gn_probes_has_frame(&room->probes);
     out_figures->holdable_fps_room = get_holdable_locked(room);
     struct gn_time_window latency = room->latency_ms;
     struct gn_time_window busy = room->busy_ms;
@@ -71,6 +71,15 @@ int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_se
     gn_mutex_lock(&room->mu);
     for (const struct gn_room_session *s = room->sessions; s && n < cap; s = s->next)
         out_sessions[n++] = s->figures;
+    gn_mutex_unlock(&room->mu);
+    return n;
+}
+
+int gn_room_get_probes(struct gn_room *room,
+                       struct gn_probe_figures out_probes[static GN_PROBES_MAX])
+{
+    gn_mutex_lock(&room->mu);
+    int n = gn_probes_get_figures(&room->probes, out_probes);
     gn_mutex_unlock(&room->mu);
     return n;
 }
