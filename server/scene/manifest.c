@@ -2,9 +2,9 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * scene.json: {"objects": [{"mesh", "role", "name", "material", "world_from_object"}], "lights":
- * []}.
+ * [...]}; what sends light is read in manifest_light.c.
  */
-#include "server/scene/scene.h"
+#include "server/scene/manifest.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/json.h"
 #include "common/pose.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
@@ -35,7 +34,8 @@ static int join_path(const char *manifest, const char *mesh, char out[static PAT
 static int read_material(const struct gn_json *item, struct gn_scene_object *object,
                          struct gn_error *out_error)
 {
-    static const char *const keys[] = {"type", "albedo", "roughness", "metallic", "ior"};
+    static const char *const keys[] = {"type", "albedo",   "roughness",       "metallic",
+                                       "ior",  "emission", "emission_stream", "emission_scale"};
     static const char *const refused[] = {"roughness", "metallic", "ior"};
     if (!gn_json_has(item, "material"))
         return 0;
@@ -71,7 +71,7 @@ static int read_material(const struct gn_json *item, struct gn_scene_object *obj
     object->material.type = (enum gn_material_type)type;
     // Diffuse without an albedo: the mesh's own colours.
     object->has_material = has_albedo || type != GN_MATERIAL_DIFFUSE;
-    return 0;
+    return gn_manifest_read_emission(&material, object, out_error);
 }
 
 static int read_name(const struct gn_json *item, const char *mesh, struct gn_scene_object *object,
@@ -150,18 +150,6 @@ static int read_object(const struct gn_json *item, struct gn_scene_object *objec
     return read_mesh(item, mesh, object, out_error); // last: the slow one
 }
 
-static int check_lights(const struct gn_json *root, struct gn_error *out_error)
-{
-    struct gn_json lights = {0};
-    if (!gn_json_has(root, "lights"))
-        return 0;
-    int ret = gn_json_get_array(root, "lights", 0, SIZE_MAX, &lights, out_error);
-    if (ret == 0 && json_array_size(lights.value) > 0)
-        ret = gn_json_refuse(root, "lights", out_error,
-                             "lights in a scene are not built yet: leave it out or empty");
-    return ret;
-}
-
 static int read_objects(const struct gn_json *array, struct gn_scene_object *objects, int n_objects,
                         struct gn_error *out_error)
 {
@@ -185,13 +173,15 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
     struct gn_json root = {0};
     struct gn_json array = {0};
     struct gn_scene_object *objects = NULL;
+    struct gn_scene_light *lights = NULL;
     int n_objects = 0;
+    int n_lights = 0;
     *out_scene = NULL;
     int ret = gn_json_load_file(path, &root, out_error);
     if (ret == 0)
         ret = gn_json_check_keys(&root, keys, LENGTH(keys), out_error);
     if (ret == 0)
-        ret = check_lights(&root, out_error);
+        ret = gn_manifest_read_lights(&root, &lights, &n_lights, out_error);
     if (ret == 0 && gn_json_has(&root, "model"))
         ret = gn_json_get_enum(&root, "model", models, LENGTH(models), &model, out_error);
     if (ret == 0)
@@ -209,6 +199,8 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
         goto out;
     struct gn_error reason = {0};
     ret = gn_scene_create(objects, n_objects, pool, out_scene, &reason);
+    if (ret == 0 && (ret = gn_scene_set_lights(*out_scene, lights, n_lights, &reason)) < 0)
+        gn_scene_destroy(out_scene);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", path, reason.text);
     else
@@ -216,9 +208,11 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
 out:
     for (int i = 0; objects && i < n_objects; i++) { // zeroed where the scene took them
         free(objects[i].name);
+        free(objects[i].emission_stream);
         gn_mesh_finish(&objects[i].mesh);
     }
     free(objects);
+    free(lights);
     gn_json_finish(&root);
     return ret;
 }

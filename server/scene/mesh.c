@@ -13,6 +13,7 @@ void gn_mesh_finish(struct gn_mesh *mesh)
 {
     free(mesh->positions);
     free(mesh->normals);
+    free(mesh->uvs);
     free(mesh->triangles);
     free(mesh->albedos);
     *mesh = (struct gn_mesh){0};

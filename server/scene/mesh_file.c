@@ -37,6 +37,7 @@ struct importer {
     const struct aiScene *scene;
     struct gn_error *error; // may be NULL
     bool has_normals;       // some mesh of the file has: all get them
+    bool has_uvs;           // some mesh of the file has: all get them, 0 where they have none
     bool has_albedos;       // some mesh of the file has a material: all get albedos
     long n_vertices;
     long n_triangles;
@@ -200,6 +201,11 @@ static uint32_t add_vertex(struct importer *im, const struct aiMesh *part, unsig
     transform_position(m, &part->mVertices[index], im->mesh->positions + at);
     if (part->mNormals)
         transform_normal(inverse, &part->mNormals[index], im->mesh->normals + at);
+    const struct aiVector3D *uvs = part->mTextureCoords[0];
+    if (uvs && im->mesh->uvs) {
+        im->mesh->uvs[2 * (size_t)im->mesh->n_vertices] = uvs[index].x;
+        im->mesh->uvs[2 * (size_t)im->mesh->n_vertices + 1] = uvs[index].y;
+    }
     return (uint32_t)im->mesh->n_vertices++;
 }
 
@@ -353,6 +359,8 @@ static int allocate(struct importer *im, struct gn_mesh *mesh)
         return -ENOMEM;
     if (im->has_normals && !(mesh->normals = calloc(n_vertices, 3 * sizeof(*mesh->normals))))
         return -ENOMEM;
+    if (im->has_uvs && !(mesh->uvs = calloc(n_vertices, 2 * sizeof(*mesh->uvs))))
+        return -ENOMEM;
     if (im->has_albedos && !(mesh->albedos = calloc(n_triangles, 3 * sizeof(*mesh->albedos))))
         return -ENOMEM;
     return 0;
@@ -365,6 +373,7 @@ static void find_attributes(struct importer *im)
         const struct aiMesh *part = im->scene->mMeshes[i];
         float albedo[3];
         im->has_normals |= part && part->mNormals;
+        im->has_uvs |= part && part->mTextureCoords[0];
         im->has_albedos |= part && get_albedo(im, part, albedo);
     }
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "common/pose.h"
+#include "server/scene/emission.h"
 
 // Reflectance of a diffuse object whose file and manifest say nothing.
 #define DEFAULT_ALBEDO 0.5f
@@ -16,6 +17,7 @@ static void finish_objects(struct gn_scene_object *objects, int n_objects)
 {
     for (int i = 0; i < n_objects; i++) {
         free(objects[i].name);
+        free(objects[i].emission_stream);
         gn_mesh_finish(&objects[i].mesh);
     }
 }
@@ -30,6 +32,7 @@ void gn_scene_destroy(struct gn_scene **scene)
     if (self->objects)
         finish_objects(self->objects, self->n_objects);
     free(self->objects);
+    free(self->lights);
     free(self);
 }
 
@@ -73,7 +76,19 @@ static int check_object(struct gn_scene_object *object, int index, struct gn_err
     if (ret < 0)
         return gn_error_set(out_error, ret, "object %d (%s): %s", index,
                             object->name ? object->name : "no name", reason.text);
-    return 0;
+    return gn_scene_check_emission(object, index, out_error);
+}
+
+static int check_emitter_count(const struct gn_scene_object *objects, int n_objects,
+                               struct gn_error *out_error)
+{
+    int n = 0;
+    for (int i = 0; i < n_objects; i++)
+        n += gn_scene_is_emitter(&objects[i]);
+    return n <= GN_SCENE_MAX_EMITTERS
+               ? 0
+               : gn_error_set(out_error, -E2BIG, "%d objects with emission; at most %d are taken",
+                              n, GN_SCENE_MAX_EMITTERS);
 }
 
 static int add_object(struct gn_scene *scene, int index, struct gn_error *out_error)
@@ -115,6 +130,8 @@ int gn_scene_create(struct gn_scene_object *objects, int n_objects, struct gn_po
     }
     for (int i = 0; i < n_objects && ret == 0; i++)
         ret = check_object(&objects[i], i, out_error);
+    if (ret == 0)
+        ret = check_emitter_count(objects, n_objects, out_error);
     if (ret < 0)
         goto out;
     // A plain copy while it may still fail: the arrays stay the caller's till the end.
@@ -132,6 +149,48 @@ int gn_scene_create(struct gn_scene_object *objects, int n_objects, struct gn_po
 out:
     gn_scene_destroy(&scene); // n_objects is still 0: nothing of the caller's is freed
     return ret;
+}
+
+static int check_light(const struct gn_scene_light *light, int index, struct gn_error *out_error)
+{
+    if (light->role != GN_RT_REAL && light->role != GN_RT_VIRTUAL)
+        return gn_error_set(out_error, -EINVAL, "light %d: its role is neither real nor virtual",
+                            index);
+    if (!(light->radius >= 0.0f && light->radius <= (float)GN_RT_MAX_COORDINATE))
+        return gn_error_set(out_error, -EINVAL, "light %d: radius must lie in [0, 1e11] m", index);
+    for (int k = 0; k < 3; k++) {
+        if (!(fabs(light->position[k]) <= GN_RT_MAX_COORDINATE))
+            return gn_error_set(out_error, -EINVAL, "light %d: position must lie within 1e11 m",
+                                index);
+        if (!(light->intensity[k] >= 0.0f && light->intensity[k] <= (float)GN_SCENE_MAX_EMISSION))
+            return gn_error_set(out_error, -EINVAL, "light %d: intensity must lie in [0, 1e12]",
+                                index);
+    }
+    return 0;
+}
+
+int gn_scene_set_lights(struct gn_scene *scene, const struct gn_scene_light *lights, int n_lights,
+                        struct gn_error *out_error)
+{
+    if (n_lights < 0 || n_lights > GN_SCENE_MAX_LIGHTS)
+        return gn_error_set(out_error, -EINVAL, "%d lights; a scene has at most %d", n_lights,
+                            GN_SCENE_MAX_LIGHTS);
+    for (int i = 0; i < n_lights; i++) {
+        int ret = check_light(&lights[i], i, out_error);
+        if (ret < 0)
+            return ret;
+    }
+    struct gn_scene_light *copy = NULL;
+    if (n_lights > 0) {
+        copy = malloc((size_t)n_lights * sizeof(*copy));
+        if (!copy)
+            return gn_error_set(out_error, -ENOMEM, "out of memory");
+        memcpy(copy, lights, (size_t)n_lights * sizeof(*copy));
+    }
+    free(scene->lights);
+    scene->lights = copy;
+    scene->n_lights = n_lights;
+    return 0;
 }
 
 static float dot(const float a[static 3], const float b[static 3])
@@ -168,12 +227,24 @@ static bool get_shading_normal(const struct gn_scene_object *object, const struc
     return true;
 }
 
+static void get_uv(const struct gn_mesh *mesh, const struct gn_rt_hit *hit, float out_uv[static 2])
+{
+    const uint32_t *index = mesh->triangles + 3 * (size_t)hit->triangle;
+    for (int k = 0; k < 2 && mesh->uvs; k++)
+        out_uv[k] = (1.0f - hit->u - hit->v) * mesh->uvs[2 * (size_t)index[0] + (size_t)k] +
+                    hit->u * mesh->uvs[2 * (size_t)index[1] + (size_t)k] +
+                    hit->v * mesh->uvs[2 * (size_t)index[2] + (size_t)k];
+}
+
 void gn_scene_get_surface(const struct gn_scene *scene, const float dir[static 3],
                           const struct gn_rt_hit *hit, struct gn_surface *out_surface)
 {
     const struct gn_scene_object *object = &scene->objects[hit->object];
-    struct gn_surface s = {.clearance = hit->clearance, .role = object->role};
+    struct gn_surface s = {
+        .clearance = hit->clearance, .role = object->role, .object = hit->object};
     float side = dot(hit->normal, dir) > 0.0f ? -1.0f : 1.0f;
+    s.is_front = side > 0.0f; // rt's normal is the outside's, also where the matrix mirrors
+    get_uv(&object->mesh, hit, s.uv);
     for (int k = 0; k < 3; k++) {
         s.point[k] = hit->point[k];
         s.normal_geometric[k] = side * hit->normal[k];

@@ -58,7 +58,6 @@ struct gn_scene_object {
     float emission_scale;  // W/(sr m^2) of a linear picture value of 1, > 0; with a stream
     double world_from_object[16];
     double normal_matrix[9]; // inverse transpose of the 3x3 part, row-major, for shading normals
-    bool is_mirrored;        // the matrix turns the winding round; filled by gn_scene_create
     struct gn_mesh mesh;     // owned
 };
 
@@ -85,15 +84,19 @@ struct gn_scene {
 /**
  * Reads scene.json (docs/frames.md) and all meshes, and commits:
  *   {"objects": [{"mesh": "a.obj", "role": "virtual" or "real", "name": "a",
- *                 "material": {"type": "diffuse" or "mirror", "albedo": [r, g, b]},
- *                 "world_from_object": [16 numbers, row-major]}], "lights": [],
- *    "model": "local" (default) or "global"}
- * Only mesh and role must be there. Paths are relative to the file. Without a material, or with a
- * diffuse one without albedo, the mesh's own colours count, or 0.5; a mirror's albedo is 1 unless
- * said. The matrix may scale, shear and mirror; absent, it is the identity. An unknown key, role or
- * material, a missing mesh, a singular matrix, a list of lights (not built yet), a scene without
- * objects is refused with the file, the place and what would be right. Returns 0 or a negative
- * errno.
+ *                 "material": {"type": "diffuse" or "mirror", "albedo": [r, g, b],
+ *                              "emission": [r, g, b], "emission_stream": "tv",
+ *                              "emission_scale": 1},
+ *                 "world_from_object": [16 numbers, row-major]}],
+ *    "lights": [{"type": "point", "position": [x, y, z], "intensity": [r, g, b], "radius": 0,
+ *                "role": "real" or "virtual"}]}
+ * Of an object only mesh and role must be there, of a light type, position and intensity. Paths are
+ * relative to the file. Without a material, or with a diffuse one without albedo, the mesh's own
+ * colours count, or 0.5; a mirror's albedo is 1 unless said. The matrix may scale, shear and
+ * mirror; absent, it is the identity. An unknown key, role or material, a missing mesh, a singular
+ * matrix, light that is negative or above GN_SCENE_MAX_EMISSION, a mesh without uvs under a stream,
+ * a scene without objects is refused with the file, the place and what would be right. Returns 0 or
+ * a negative errno.
  */
 GN_MUST_USE int gn_scene_read_file(const char *path, struct gn_pool *pool,
                                    struct gn_scene **out_scene, struct gn_error *out_error);
@@ -105,6 +108,10 @@ GN_MUST_USE int gn_scene_read_file(const char *path, struct gn_pool *pool,
 GN_MUST_USE int gn_scene_create(struct gn_scene_object *objects, int n_objects,
                                 struct gn_pool *pool, struct gn_scene **out_scene,
                                 struct gn_error *out_error);
+
+/** Replaces the lights of a scene that nobody uses yet; copies. 0, -EINVAL, -ENOMEM. */
+GN_MUST_USE int gn_scene_set_lights(struct gn_scene *scene, const struct gn_scene_light *lights,
+                                    int n_lights, struct gn_error *out_error);
 
 /** NULL-safe; nulls *scene. */
 void gn_scene_destroy(struct gn_scene **scene);

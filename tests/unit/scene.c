@@ -147,7 +147,7 @@ static void test_manifest_errors_say_where(void **state)
         {"{\"objects\":[" OBJECT ",\"colour\":1}]}", {"objects[0]", "colour"}},
         {"{\"objects\":[" OBJECT ",\"name\":\"\"}]}", {"objects[0].name", "1 to 255"}},
         {"{\"objects\":[" OBJECT "}],\"light\":[]}", {"light", ""}},
-        {"{\"objects\":[" OBJECT "}],\"lights\":[{}]}", {"lights", "not built yet"}},
+        {"{\"objects\":[" OBJECT "}],\"lights\":[{}]}", {"lights[0]", "type"}},
         {"{\"objects\":[" OBJECT "}],\"lights\":3}", {"lights", "array"}},
         {"{\"objects\":[" OBJECT ",\"material\":{}}]}", {"objects[0].material", "type"}},
         {"{\"objects\":[" OBJECT ",\"material\":{\"type\":\"glass\"}}]}",
@@ -243,6 +243,7 @@ static void test_normals_face_the_ray_and_turn_with_the_object(void **state)
         for (int k = 0; k < 3; k++)
             facing += (double)s.normal_geometric[k] * back[k];
         assert_true(facing <= 0.0);
+        assert_true(s.is_front); // the matrix mirrors, and outside stays outside
         // From inside both turn round.
         assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, inside, dir, 0.0f, INFINITY, &hit));
         gn_scene_get_surface(scene, dir, &hit, &s);
@@ -253,6 +254,7 @@ static void test_normals_face_the_ray_and_turn_with_the_object(void **state)
             same += (double)s.normal_geometric[k] * s.normal_shading[k];
         }
         assert_true(facing < 0.0);
+        assert_false(s.is_front);
         assert_true(same > 0.99);
     }
     gn_scene_destroy(&scene);
