@@ -13,6 +13,7 @@
 #include "server/light/map_geometry.h"
 #include "server/light/method.h"
 #include "server/light/sh.h"
+#include "server/light/temporal.h"
 
 /* A light with its place in the list, which decides between equals. */
 struct ranked_light {
@@ -119,6 +120,43 @@ static double to_ms(int64_t duration_ns)
     return (double)duration_ns / (double)GN_NS_PER_MS;
 }
 
+/* What follows the frames takes the place of what this one says. */
+static int publish_smoothed(struct gn_lighting_state *state)
+{
+    const struct gn_temporal *t = state->temporal;
+    struct gn_light *lights = malloc((size_t)t->n_lights * sizeof(*lights) + 1);
+    if (!lights)
+        return -ENOMEM;
+    for (int i = 0; i < t->n_lights; i++)
+        gn_temporal_get_light(t, i, &lights[i]);
+    free(state->lights);
+    state->lights = lights;
+    state->n_lights = t->n_lights;
+    memcpy(state->total_irradiance, t->total, sizeof(t->total));
+    if (state->has_sh)
+        memcpy(state->sh, t->values, sizeof(state->sh));
+    state->in_time = t->figures;
+    return 0;
+}
+
+static int smooth(struct gn_lighting_state *state, const struct gn_light_options *options)
+{
+    const struct gn_temporal *kept =
+        options->previous && !options->starts_stream ? options->previous->temporal : NULL;
+    struct gn_temporal_input input = {.time_ns = state->capture_time_ns,
+                                      .has_lights = state->has_lights,
+                                      .n_lights = state->n_lights,
+                                      .lights = state->lights,
+                                      .n_values = state->has_sh ? 27 : 0};
+    _Static_assert(sizeof(state->sh) == 27 * sizeof(double) && 27 <= GN_TEMPORAL_VALUES_MAX,
+                   "all harmonics are followed");
+    memcpy(input.total, state->total_irradiance, sizeof(input.total));
+    if (state->has_sh)
+        memcpy(input.values, state->sh, sizeof(state->sh));
+    int rc = gn_temporal_follow(kept, &input, options->smoothing, &state->temporal);
+    return rc < 0 ? rc : publish_smoothed(state);
+}
+
 static int fill_state(struct gn_lighting_state *state, const struct gn_environment_frame *frame,
                       const struct gn_radiance_map_options *map_options,
                       const struct gn_light_options *options, struct gn_pool *pool,
@@ -133,18 +171,24 @@ static int fill_state(struct gn_lighting_state *state, const struct gn_environme
     if (state->has_sh && gn_sh_project_map(state->map, pool, state->sh) < 0)
         return gn_error_set(out_error, -ENOMEM, "spherical harmonics: no memory");
     int64_t sh_ns = gn_clock_get_monotonic_ns();
-    rc = make_lights(state, options, pool, out_error);
+    state->has_lights = !options->no_lights;
+    if (state->has_lights)
+        rc = make_lights(state, options, pool, out_error);
     if (rc < 0)
         return rc;
+    int64_t lights_ns = gn_clock_get_monotonic_ns();
     for (int c = 0; c < 3; c++)
         state->total_irradiance[c] = state->map->figures.shown_irradiance[c] +
                                      (double)state->map->fill[c] * state->map->fill_solid_angle;
     state->sequence = frame->sequence;
     state->capture_time_ns = frame->capture_time_ns;
+    if (options->smoothing > 0 && smooth(state, options) < 0)
+        return gn_error_set(out_error, -ENOMEM, "light in time: no memory");
     state->published_time_ns = gn_clock_get_monotonic_ns();
     state->ms_map = to_ms(map_ns - start_ns);
     state->ms_sh = to_ms(sh_ns - map_ns);
-    state->ms_lights = to_ms(state->published_time_ns - sh_ns);
+    state->ms_lights = to_ms(lights_ns - sh_ns);
+    state->ms_temporal = to_ms(state->published_time_ns - lights_ns);
     return 0;
 }
 
@@ -160,6 +204,8 @@ int gn_lighting_state_create(const struct gn_environment_frame *frame,
         options = &defaults;
     if (map_options)
         map_copy = *map_options;
+    if (!(options->smoothing >= 0 && options->smoothing <= 10))
+        return gn_error_set(out_error, -EINVAL, "light options: smoothing must be 0 to 10 s");
     if (!map_copy.previous && options->previous)
         map_copy.previous = options->previous->map;
     struct gn_lighting_state *state = calloc(1, sizeof(*state));
@@ -188,6 +234,7 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
     if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
         return;
     gn_light_memory_destroy(&s->memory);
+    free(s->temporal);
     for (int i = 0; i < s->n_others; i++)
         gn_lighting_state_unref(&s->others[i]);
     gn_partition_plan_unref(&s->plan);

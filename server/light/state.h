@@ -13,6 +13,7 @@
 
 struct gn_light_memory;   // server/light/lights.h
 struct gn_partition_plan; // server/light/partition_plan.h
+struct gn_temporal;       // server/light/temporal.h
 
 /** Most probes that light a room together. */
 #define GN_PROBES_MAX 8
@@ -87,11 +88,33 @@ struct gn_light_options {
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)
     unsigned mended;  // GN_READ_* not taken to the letter after all
     enum gn_light_weights weights; // of importance samples as lights; default equal
-    bool relaxed; // importance samples moved by the correction table: evener, but they move
-                  // with the light: for still pictures, not for streams
-    bool no_sh;   // leave the SH irradiance out
+    bool relaxed;       // importance samples moved by the correction table: evener, but they move
+                        // with the light: for still pictures, not for streams
+    bool no_sh;         // leave the SH irradiance out
+    bool no_lights;     // leave the lights out
+    double smoothing;   // s, time constant by which light follows the frames, [0, 10]; 0: at once
+    bool starts_stream; // the frame is not of the previous state's stream: nothing is smoothed
     const struct gn_lighting_state *previous; // borrowed during the call, may be NULL: the last
                                               // state of the stream, whose tables are used again
+};
+
+/** What a frame's light became in time (server/light/temporal.h). */
+enum gn_temporal_verdict {
+    GN_TEMPORAL_OFF = 0,    // not smoothed
+    GN_TEMPORAL_START = 1,  // taken as it is: the first of a stream, or after a gap
+    GN_TEMPORAL_FOLLOW = 2, // filtered
+    GN_TEMPORAL_HOLD = 3,   // the capture time did not rise: lights and harmonics stay as they were
+};
+
+/** Figures of the light in time. */
+struct gn_temporal_figures {
+    enum gn_temporal_verdict verdict;
+    double dt_ms; // since the frame followed last; 0 where the verdict is OFF or START
+    double alpha; // share of the way to the new frame
+    int n_births; // lights that the frame has and the last one had not
+    int n_deaths; // lights that the last one had and this one has not
+    int n_snaps;  // lights that took their new value at once
+    int n_fading; // lights published that the map has no more
 };
 
 /** What the method found. */
@@ -112,14 +135,17 @@ struct gn_lighting_state {
     struct gn_radiance_map *map; // shared (ref), never NULL
     bool has_sh;
     double sh[9][3]; // L_lm of the radiance in world axes, order 00 1-1 10 11 2-2 2-1 20 21 22
+    bool has_lights;
     int n_lights;
     struct gn_light *lights; // [n_lights], owned; by falling luminance
     int n_near;
     struct gn_near_light *near;   // [n_near], owned; those of `emission` that give light
     struct gn_emission *emission; // pictures on emitters; shared (ref), may be NULL: no near light
     double total_irradiance[3];   // sum over the sphere, fill included, of L dOmega, W/m^2: what
-                                  // the lights add up to (seed: they do not)
+                                  // the lights add up to (seed: they do not); smoothed
     struct gn_light_figures figures;
+    struct gn_temporal_figures in_time;
+    struct gn_temporal *temporal;   // what the filter keeps; owned, NULL: nothing is smoothed
     struct gn_partition_plan *plan; // which texel lies in which base region; shared (ref), may be
                                     // NULL
     struct gn_light_memory *memory; // what the method keeps for the next frame; owned, may be NULL
@@ -129,7 +155,7 @@ struct gn_lighting_state {
     uint64_t sequence;                                   // of the environment frame
     int64_t capture_time_ns;
     int64_t published_time_ns;
-    double ms_map, ms_sh, ms_lights; // time spent, ms
+    double ms_map, ms_sh, ms_lights, ms_temporal; // time spent, ms
 };
 
 /** Makes a state from a frame. Returns 0 or a negative errno and a sentence. */
