@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/light/sh.h"
 #include "tests/meshes.h"
 
 static void must(bool is_good, const char *what, const struct gn_error *error)
@@ -80,7 +79,9 @@ void gn_test_stage_set_map(struct gn_test_stage *stage, int width, int height,
     gn_image_finish(&image);
     stage->state.map = stage->map;
     stage->state.has_sh = true;
-    must(gn_sh_project_map(stage->map, NULL, stage->state.sh) == 0, "SH", NULL);
+    must(gn_irradiance_init_from_map(&stage->state.irradiance, stage->state.sh, stage->map, NULL,
+                                     NULL) == 0,
+         "SH", NULL);
 }
 
 void gn_test_stage_set_lights(struct gn_test_stage *stage, const struct gn_light *lights, int n)

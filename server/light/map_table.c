@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/light/sh.h"
+
 static const double pi = 3.14159265358979323846;
 
 static bool is_same_projection(const struct gn_projection *a, const struct gn_projection *b)
@@ -98,44 +100,35 @@ static int list_rim(struct gn_map_table *t)
     return 0;
 }
 
-/* Integrals of the harmonics over the complement of the cap theta <= theta_max about the axis. */
+/* Integrals of the harmonics over the complement of the cap theta <= theta_max about z: those
+ * without azimuth, of P_l from -1 to cos theta_max. */
 static void integrate_complement(struct gn_map_table *t)
 {
-    const double *n = t->axis_world;
-    double c = cos(t->projection.theta_max), s2 = 1 - c * c;
-    double q = -pi * c * s2; // integral of d d^T - I/3 is q (n n^T - I/3)
-    double *h = t->fill_harmonics;
-    h[0] = 2 * pi * (1 + c);
-    h[1] = -pi * s2 * n[1];
-    h[2] = -pi * s2 * n[2];
-    h[3] = -pi * s2 * n[0];
-    h[4] = q * n[0] * n[1];
-    h[5] = q * n[1] * n[2];
-    h[6] = q * (3 * n[2] * n[2] - 1);
-    h[7] = q * n[0] * n[2];
-    h[8] = q * (n[0] * n[0] - n[1] * n[1]);
+    double c = cos(t->projection.theta_max), before = 1, legendre = c;
+    t->fill_harmonics[0] = sqrt(pi) * (1 + c);
+    for (int l = 1; l <= 4; l++) {
+        double next = ((2 * l + 1) * c * legendre - l * before) / (l + 1);
+        t->fill_harmonics[l * (l + 1)] = sqrt(pi / (2 * l + 1)) * (next - before);
+        before = legendre;
+        legendre = next;
+    }
 }
 
-/* The same where the picture's border cuts the circle: what the texels leave of the sphere. */
+/* The same where the picture's border cuts the circle: what the texels leave of the sphere, a
+ * texel's extent included as in sh_project.c. */
 static void subtract_texels(struct gn_map_table *t)
 {
-    double h[9] = {4 * pi};
+    double h[GN_SH_MAX] = {2 * sqrt(pi)};
     size_t n = (size_t)t->projection.width * (size_t)t->projection.height;
     for (size_t i = 0; i < n; i++) {
-        double w = (double)t->solid_angle[i], w1 = w * (1 - w / 12), w2 = w * (1 - w / 4);
-        double x = (double)t->direction_world[3 * i], y = (double)t->direction_world[3 * i + 1],
-               z = (double)t->direction_world[3 * i + 2];
-        double b[9] = {w,
-                       w1 * y,
-                       w1 * z,
-                       w1 * x,
-                       w2 * x * y,
-                       w2 * y * z,
-                       w2 * (3 * z * z - 1),
-                       w2 * z * x,
-                       w2 * (x * x - y * y)};
-        for (int k = 0; k < 9; k++)
-            h[k] -= b[k];
+        const float *d = t->direction_probe + 3 * i;
+        double w = (double)t->solid_angle[i], basis[GN_SH_MAX];
+        if (!(w > 0))
+            continue;
+        gn_sh_get_basis(4, (double[3]){(double)d[0], (double)d[1], (double)d[2]}, basis);
+        for (int l = 0; l <= 4; l++)
+            for (int k = l * l; k < (l + 1) * (l + 1); k++)
+                h[k] -= w * (1 - w * l * (l + 1) / 24) * basis[k];
     }
     memcpy(t->fill_harmonics, h, sizeof(h));
     t->fill_harmonics[0] = fmax(h[0], 0);
@@ -159,7 +152,7 @@ static void sum_solid_angles(struct gn_map_table *t)
         subtract_texels(t);
     else
         integrate_complement(t);
-    t->fill_solid_angle = t->fill_harmonics[0];
+    t->fill_solid_angle = 2 * sqrt(pi) * t->fill_harmonics[0];
 }
 
 static void fill_matrix(struct gn_map_table *t)

@@ -28,7 +28,8 @@ struct gn_map_table {
     uint32_t *rim;              // [n_rim][2]: such a texel, the inner one it takes its light of
     double shown_solid_angle;   // sr
     double fill_solid_angle;    // sr, of the directions not shown
-    double fill_harmonics[9];   // integral over them of gn_sh_harmonics, world axes
+    double fill_harmonics[25];  // integral over them of the basis of server/light/sh.h, order 4,
+                                // probe axes
     double axis_world[3];       // optical axis; z of the frame of a whole sphere's picture
     _Atomic(float *) spare;     // pixels of a freed map, or NULL; taken by the next one
 };

@@ -12,7 +12,6 @@
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
 #include "server/light/method.h"
-#include "server/light/sh.h"
 #include "server/light/temporal.h"
 
 /* A light with its place in the list, which decides between equals. */
@@ -139,6 +138,17 @@ static int publish_smoothed(struct gn_lighting_state *state)
     return 0;
 }
 
+/* How far the harmonics went from their old values to the frame's: 1 where these are the same. */
+static double get_share(const double *old, const double *frame, const double *now)
+{
+    double way = 0, all = 0;
+    for (int i = 0; i < 3 * GN_SH_MAX; i++) {
+        way += (now[i] - old[i]) * (frame[i] - old[i]);
+        all += (frame[i] - old[i]) * (frame[i] - old[i]);
+    }
+    return all > 0 ? fmin(fmax(way / all, 0), 1) : 1;
+}
+
 static int smooth(struct gn_lighting_state *state, const struct gn_light_options *options)
 {
     const struct gn_temporal *kept =
@@ -147,14 +157,21 @@ static int smooth(struct gn_lighting_state *state, const struct gn_light_options
                                       .has_lights = state->has_lights,
                                       .n_lights = state->n_lights,
                                       .lights = state->lights,
-                                      .n_values = state->has_sh ? 27 : 0};
-    _Static_assert(sizeof(state->sh) == 27 * sizeof(double) && 27 <= GN_TEMPORAL_VALUES_MAX,
-                   "all harmonics are followed");
+                                      .n_values = state->has_sh ? 3 * GN_SH_MAX : 0};
+    _Static_assert(3 * GN_SH_MAX <= GN_TEMPORAL_VALUES_MAX, "all harmonics are followed");
     memcpy(input.total, state->total_irradiance, sizeof(input.total));
     if (state->has_sh)
         memcpy(input.values, state->sh, sizeof(state->sh));
     int rc = gn_temporal_follow(kept, &input, options->smoothing, &state->temporal);
-    return rc < 0 ? rc : publish_smoothed(state);
+    if (rc == 0)
+        rc = publish_smoothed(state);
+    if (rc == 0 && state->has_sh) {
+        bool follows = kept && options->previous->has_sh;
+        double share = follows ? get_share(kept->values, input.values, state->temporal->values) : 1;
+        gn_irradiance_follow(&state->irradiance, follows ? &options->previous->irradiance : NULL,
+                             share, (const double(*)[3])state->sh, options->irradiance.dering);
+    }
+    return rc;
 }
 
 static int fill_state(struct gn_lighting_state *state, const struct gn_environment_frame *frame,
@@ -168,7 +185,8 @@ static int fill_state(struct gn_lighting_state *state, const struct gn_environme
         return rc;
     int64_t map_ns = gn_clock_get_monotonic_ns();
     state->has_sh = !options->no_sh;
-    if (state->has_sh && gn_sh_project_map(state->map, pool, state->sh) < 0)
+    if (state->has_sh && gn_irradiance_init_from_map(&state->irradiance, state->sh, state->map,
+                                                     &options->irradiance, pool) < 0)
         return gn_error_set(out_error, -ENOMEM, "spherical harmonics: no memory");
     int64_t sh_ns = gn_clock_get_monotonic_ns();
     state->has_lights = !options->no_lights;

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "server/light/emitters.h"
+#include "server/light/irradiance.h"
 #include "server/light/radiance_map.h"
 
 struct gn_light_memory;   // server/light/lights.h
@@ -88,9 +89,10 @@ struct gn_light_options {
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)
     unsigned mended;  // GN_READ_* not taken to the letter after all
     enum gn_light_weights weights; // of importance samples as lights; default equal
-    bool relaxed;       // importance samples moved by the correction table: evener, but they move
-                        // with the light: for still pictures, not for streams
-    bool no_sh;         // leave the SH irradiance out
+    bool relaxed; // importance samples moved by the correction table: evener, but they move
+                  // with the light: for still pictures, not for streams
+    bool no_sh;   // leave the SH irradiance out
+    struct gn_irradiance_options irradiance;
     bool no_lights;     // leave the lights out
     double smoothing;   // s, time constant by which light follows the frames, [0, 10]; 0: at once
     bool starts_stream; // the frame is not of the previous state's stream: nothing is smoothed
@@ -134,7 +136,8 @@ struct gn_lighting_state {
     _Atomic int references;
     struct gn_radiance_map *map; // shared (ref), never NULL
     bool has_sh;
-    double sh[9][3]; // L_lm of the radiance in world axes, order 00 1-1 10 11 2-2 2-1 20 21 22
+    double sh[GN_SH_MAX][3];         // L_lm of all light, world axes; 0 above irradiance.order
+    struct gn_irradiance irradiance; // of any normal
     bool has_lights;
     int n_lights;
     struct gn_light *lights; // [n_lights], owned; by falling luminance

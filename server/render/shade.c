@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "server/light/sh.h"
-
 void gn_shade_reflect(const struct gn_surface *surface, float dir[static 3])
 {
     const float *n = surface->normal_shading;
@@ -83,9 +81,7 @@ static void shade_by_irradiance_map(const struct frame *frame, struct sample *s)
     const double normal[3] = {s->surface.normal_shading[0], s->surface.normal_shading[1],
                               s->surface.normal_shading[2]};
     double e[3];
-    gn_sh_get_irradiance(frame->state->sh, normal, e);
-    for (int k = 0; k < 3; k++)
-        e[k] = fmax(e[k], 0);
+    gn_irradiance_get(&frame->state->irradiance, normal, e);
     reflect_irradiance(s, e);
 }
 

@@ -115,7 +115,7 @@ static void lights_and_harmonics_agree(void **unused)
             double dot = n[0] * (double)d[0] + n[1] * (double)d[1] + n[2] * (double)d[2];
             lit += fmax(dot, 0) * (double)state->lights[k].irradiance[1];
         }
-        gn_sh_get_irradiance((const double(*)[3])state->sh, n, e);
+        gn_sh_get_irradiance(2, (const double(*)[3])state->sh, n, e);
         /* Full power from the centroid of a cell of 60 by up to 60 degrees (the fill's) gives too
          * much on a plane that faces it: by up to 5.6 %. */
         assert_near(lit / exact, 1, 0.056);

@@ -12,6 +12,7 @@
 
 #include <cmocka.h>
 
+#include "server/light/irradiance.h"
 #include "server/light/sh.h"
 #include "tests/light_fixture.h"
 
@@ -80,9 +81,9 @@ static void irradiance_is_band_factor_times_basis(void **unused)
         get_sphere_point(i, 50, n);
         get_basis(n, basis);
         for (int k = 0; k < 9; k++) {
-            double sh[9][3] = {{0}};
+            double sh[GN_SH_MAX][3] = {{0}};
             sh[k][1] = 1;
-            gn_sh_get_irradiance(CONST_SH(sh), n, e);
+            gn_sh_get_irradiance(2, CONST_SH(sh), n, e);
             assert_near(e[1], a[k] * basis[k], 1e-12);
             assert_true(e[0] == 0 && e[2] == 0);
         }
@@ -92,19 +93,19 @@ static void irradiance_is_band_factor_times_basis(void **unused)
 static void published_constants_come_out(void **unused)
 {
     (void)unused;
-    double sh[9][3] = {{0}}, e[3];
+    double sh[GN_SH_MAX][3] = {{0}}, e[3];
     sh[8][0] = 1; // c1 at +x; a known bug has c3 here
     sh[3][1] = 1; // 2 c2 at +x
     sh[0][2] = 1; // c4
-    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){1, 0, 0}, e);
+    gn_sh_get_irradiance(2, CONST_SH(sh), (double[3]){1, 0, 0}, e);
     assert_near(e[0], 0.429043, 5e-7);
     assert_near(e[1], 2 * 0.511664, 2e-6); // published rounded up: 0.5116634
     assert_near(e[2], 0.886227, 5e-7);
     memset(sh, 0, sizeof(sh));
     sh[6][0] = 1; // c3 - c5 at +z, -c5 at +x
-    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){0, 0, 1}, e);
+    gn_sh_get_irradiance(2, CONST_SH(sh), (double[3]){0, 0, 1}, e);
     assert_near(e[0], 0.743125 - 0.247708, 3e-6);
-    gn_sh_get_irradiance(CONST_SH(sh), (double[3]){1, 0, 0}, e);
+    gn_sh_get_irradiance(2, CONST_SH(sh), (double[3]){1, 0, 0}, e);
     assert_near(e[0], -0.247708, 5e-7);
 }
 
@@ -126,7 +127,7 @@ static void published_lights_evaluate(void **unused)
     };
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         double e[3];
-        gn_sh_get_irradiance(cases[i].sh, cases[i].normal, e);
+        gn_sh_get_irradiance(2, cases[i].sh, cases[i].normal, e);
         for (int c = 0; c < 3; c++)
             assert_near(e[c], cases[i].irradiance[c], 1e-6);
     }
@@ -135,7 +136,7 @@ static void published_lights_evaluate(void **unused)
     for (int i = 0; i < N; i++) { // real light that rings below zero
         double n[3], e[3];
         get_sphere_point(i, N, n);
-        gn_sh_get_irradiance(grace, n, e);
+        gn_sh_get_irradiance(2, grace, n, e);
         min = fmin(min, e[2]);
         mean += e[2] / N;
     }
@@ -145,7 +146,7 @@ static void published_lights_evaluate(void **unused)
 
 /* A map with negative light cannot come from a frame: its pixels are written over. */
 static void check_projects_back(enum gn_projection_type type, int width, int height,
-                                const double sh[9][3])
+                                const double sh[][3])
 {
     struct light_fixture f;
     assert_int_equal(light_fixture_init(&f, type, width, height), 0);
@@ -162,8 +163,8 @@ static void check_projects_back(enum gn_projection_type type, int width, int hei
             map->radiance.data[3 * i + c] = (float)l;
         }
     }
-    double out[9][3];
-    assert_int_equal(gn_sh_project_map(map, NULL, out), 0);
+    double out[GN_SH_MAX][3];
+    assert_int_equal(gn_sh_project_map(map, 2, NULL, out), 0);
     for (int k = 0; k < 9; k++)
         for (int c = 0; c < 3; c++)
             assert_near(out[k][c], sh[k][c], 1e-4);
@@ -198,11 +199,11 @@ static void constant_map_is_pi(void **unused)
         assert_int_equal(light_fixture_init(&f, cases[i].type, cases[i].width, cases[i].height), 0);
         light_fixture_fill(&f, light_fixture_constant);
         struct gn_radiance_map *map = make_map(&f);
-        double sh[9][3], e[3];
-        assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+        double sh[GN_SH_MAX][3], e[3];
+        assert_int_equal(gn_sh_project_map(map, 2, NULL, sh), 0);
         for (int k = 1; k < 9; k++)
             assert_near(sh[k][0], 0, cases[i].tolerance);
-        gn_sh_get_irradiance(CONST_SH(sh), (double[3]){0.6, 0, 0.8}, e);
+        gn_sh_get_irradiance(2, CONST_SH(sh), (double[3]){0.6, 0, 0.8}, e);
         assert_near(e[0], pi, 5 * cases[i].tolerance);
         gn_radiance_map_unref(&map);
         light_fixture_finish(&f);
@@ -223,8 +224,8 @@ static void analytic_maps_have_their_coefficients(void **unused)
     assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
     light_fixture_fill(&f, linear_light);
     struct gn_radiance_map *map = make_map(&f);
-    double sh[9][3];
-    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    double sh[GN_SH_MAX][3];
+    assert_int_equal(gn_sh_project_map(map, 2, NULL, sh), 0);
     /* max(0, z): A_l / 2pi times the zonal basis at +z, the clamped cosine itself */
     assert_near(sh[0][0], sqrt(pi) / 2, 1e-4);
     assert_near(sh[2][0], sqrt(pi / 3), 1e-4);
@@ -245,13 +246,13 @@ static void delta_light_errs_as_known(void **unused)
     gn_image_at(&f.image, 700, 400)[1] = (float)(1 / w);
     assert_true(gn_projection_get_direction(&f.frame.projection, 700.5, 400.5, l));
     struct gn_radiance_map *map = make_map(&f);
-    double sh[9][3], worst = 0, mean = 0, low = 1, high = 0;
-    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    double sh[GN_SH_MAX][3], worst = 0, mean = 0, low = 1, high = 0;
+    assert_int_equal(gn_sh_project_map(map, 2, NULL, sh), 0);
     enum { N = 40000 };
     for (int i = 0; i < N; i++) {
         double n[3], e[3];
         get_sphere_point(i, N, n);
-        gn_sh_get_irradiance(CONST_SH(sh), n, e);
+        gn_sh_get_irradiance(2, CONST_SH(sh), n, e);
         double error = fabs(e[1] - fmax(0, n[0] * l[0] + n[1] * l[1] + n[2] * l[2]));
         worst = fmax(worst, error);
         mean += error / N;
@@ -280,8 +281,8 @@ static void broad_light_is_within_one_and_a_half_percent(void **unused)
     assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 128, 64), 0);
     light_fixture_fill(&f, broad_light);
     struct gn_radiance_map *map = make_map(&f);
-    double sh[9][3], squares[3] = {0}, total[3] = {0};
-    assert_int_equal(gn_sh_project_map(map, NULL, sh), 0);
+    double sh[GN_SH_MAX][3], squares[3] = {0}, total[3] = {0};
+    assert_int_equal(gn_sh_project_map(map, 2, NULL, sh), 0);
     for (int i = 0; i < 200; i++) {
         double n[3], e[3], exact[3] = {0};
         get_sphere_point(i, 200, n);
@@ -292,7 +293,7 @@ static void broad_light_is_within_one_and_a_half_percent(void **unused)
                 exact[c] += fmax(dot, 0) * (double)map->solid_angle[t] *
                             (double)map->radiance.data[3 * t + c];
         }
-        gn_sh_get_irradiance(CONST_SH(sh), n, e);
+        gn_sh_get_irradiance(2, CONST_SH(sh), n, e);
         for (int c = 0; c < 3; c++) {
             squares[c] += (e[c] - exact[c]) * (e[c] - exact[c]);
             total[c] += exact[c] * exact[c];
@@ -317,15 +318,15 @@ static void turning_the_probe_turns_the_light(void **unused)
         struct gn_radiance_map *still = make_map(&f);
         memcpy(f.frame.world_from_probe, turn.rotation, sizeof(turn.rotation));
         struct gn_radiance_map *turned = make_map(&f);
-        double sh[9][3], sh_turned[9][3];
-        assert_int_equal(gn_sh_project_map(still, NULL, sh), 0);
-        assert_int_equal(gn_sh_project_map(turned, NULL, sh_turned), 0);
+        double sh[GN_SH_MAX][3], sh_turned[GN_SH_MAX][3];
+        assert_int_equal(gn_sh_project_map(still, 2, NULL, sh), 0);
+        assert_int_equal(gn_sh_project_map(turned, 2, NULL, sh_turned), 0);
         for (int i = 0; i < 50; i++) {
             double n[3], n_world[3], e[3], e_turned[3];
             get_sphere_point(i, 50, n);
             gn_pose_rotate(&turn, n, n_world);
-            gn_sh_get_irradiance(CONST_SH(sh), n, e);
-            gn_sh_get_irradiance(CONST_SH(sh_turned), n_world, e_turned);
+            gn_sh_get_irradiance(2, CONST_SH(sh), n, e);
+            gn_sh_get_irradiance(2, CONST_SH(sh_turned), n_world, e_turned);
             for (int c = 0; c < 3; c++)
                 assert_near(e[c], e_turned[c], 1e-5);
         }
@@ -338,14 +339,16 @@ static void turning_the_probe_turns_the_light(void **unused)
 static void irradiance_map_holds_clamped_irradiance(void **unused)
 {
     (void)unused;
+    struct gn_irradiance irradiance;
     struct gn_image map;
     int n_clamped = 0;
-    assert_int_equal(gn_sh_make_irradiance_map(grace, 64, 32, &map), 0);
+    gn_irradiance_init(&irradiance, 2, grace, NULL, 0, false);
+    assert_int_equal(gn_irradiance_make_map(&irradiance, 64, 32, &map), 0);
     for (int y = 0; y < 32; y++) {
         for (int x = 0; x < 64; x++) {
             double theta = pi * (y + 0.5) / 32, phi = pi - 2 * pi * (x + 0.5) / 64, e[3];
             double n[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
-            gn_sh_get_irradiance(grace, n, e);
+            gn_sh_get_irradiance(2, grace, n, e);
             n_clamped += e[2] < 0;
             for (int c = 0; c < 3; c++)
                 assert_near(gn_image_at(&map, x, y)[c], fmax(e[c], 0), 1e-6);
@@ -353,7 +356,7 @@ static void irradiance_map_holds_clamped_irradiance(void **unused)
     }
     assert_true(n_clamped > 0);
     gn_image_finish(&map);
-    assert_true(gn_sh_make_irradiance_map(grace, 0, 32, &map) < 0);
+    assert_true(gn_irradiance_make_map(&irradiance, 0, 32, &map) < 0);
 }
 
 int main(void)

@@ -1,0 +1,72 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* What the files sh*.c share; for them only. */
+#ifndef GN_SERVER_LIGHT_SH_INTERNAL_H
+#define GN_SERVER_LIGHT_SH_INTERNAL_H
+
+#include <string.h>
+
+#include "server/light/sh.h"
+
+/** The harmonics are polynomials of the direction times these. */
+extern const double gn_sh_factor[GN_SH_MAX];
+
+/** The polynomials p[0 ... 8] in the direction (x, y, z), for numbers and for vectors of them. */
+#define GN_SH_POLYNOMIALS_2(p, one, x, y, z)                                                       \
+    do {                                                                                           \
+        (p)[0] = (one);                                                                            \
+        (p)[1] = (y);                                                                              \
+        (p)[2] = (z);                                                                              \
+        (p)[3] = (x);                                                                              \
+        (p)[4] = (x) * (y);                                                                        \
+        (p)[5] = (y) * (z);                                                                        \
+        (p)[6] = 3.0f * (z) * (z) - (one);                                                         \
+        (p)[7] = (x) * (z);                                                                        \
+        (p)[8] = (x) * (x) - (y) * (y);                                                            \
+    } while (0)
+
+/** p[9 ... 24], from p[0 ... 8]. */
+#define GN_SH_POLYNOMIALS_4(p, x, y, z)                                                            \
+    do {                                                                                           \
+        (p)[9] = (y) * (3.0f * (x) * (x) - (y) * (y));                                             \
+        (p)[10] = (p)[4] * (z);                                                                    \
+        (p)[11] = (y) * (5.0f * (z) * (z) - (p)[0]);                                               \
+        (p)[12] = (z) * (5.0f * (z) * (z)-3.0f);                                                   \
+        (p)[13] = (x) * (5.0f * (z) * (z) - (p)[0]);                                               \
+        (p)[14] = (p)[8] * (z);                                                                    \
+        (p)[15] = (x) * ((x) * (x)-3.0f * (y) * (y));                                              \
+        (p)[16] = (p)[4] * (p)[8];                                                                 \
+        (p)[17] = (p)[9] * (z);                                                                    \
+        (p)[18] = (p)[4] * (7.0f * (z) * (z) - (p)[0]);                                            \
+        (p)[19] = (p)[5] * (7.0f * (z) * (z)-3.0f);                                                \
+        (p)[20] = (35.0f * (z) * (z)-30.0f) * (z) * (z) + 3.0f;                                    \
+        (p)[21] = (p)[7] * (7.0f * (z) * (z)-3.0f);                                                \
+        (p)[22] = (p)[8] * (7.0f * (z) * (z) - (p)[0]);                                            \
+        (p)[23] = (p)[15] * (z);                                                                   \
+        (p)[24] = (p)[15] * (x) - (p)[9] * (y);                                                    \
+    } while (0)
+
+/** Four floats that are worked on at once; the language's operators work lane by lane. */
+typedef float gn_sh_vec __attribute__((vector_size(16)));
+/** Vectors that are summed in float before the sum goes to double. */
+enum { GN_SH_LANES = 4, GN_SH_BLOCK = 16 };
+
+static inline gn_sh_vec gn_sh_load(const float *at)
+{
+    gn_sh_vec v;
+    memcpy(&v, at, sizeof(v));
+    return v;
+}
+
+/** Integrals of light times the polynomials, in the probe's axes. */
+struct gn_sh_sums {
+    double p[GN_SH_MAX][3];
+};
+
+/** The columns' waves of a lat-long of that width: malloc'ed, or NULL. */
+GN_MUST_USE float *gn_sh_make_columns(int width, int order);
+/** Adds row y of a lat-long. */
+void gn_sh_add_latlong_row(const struct gn_image *image, int y, int order, const float *columns,
+                           struct gn_sh_sums *sums);
+
+#endif
