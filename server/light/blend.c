@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdatomic.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,25 +21,33 @@ int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int n
     struct gn_lighting_state *s = calloc(1, sizeof(*s));
     if (!s)
         return -ENOMEM;
+    size_t lights_bytes = (size_t)first->n_lights * sizeof(*s->lights);
+    // All but the counter, which others change meanwhile.
+    memcpy((char *)s + offsetof(struct gn_lighting_state, map),
+           (const char *)first + offsetof(struct gn_lighting_state, map),
+           sizeof(*s) - offsetof(struct gn_lighting_state, map));
     atomic_init(&s->references, 1);
-    s->lights = malloc((size_t)first->n_lights * sizeof(*s->lights) + 1);
-    if (!s->lights) {
-        gn_lighting_state_unref(&s);
-        return -ENOMEM;
-    }
-    memcpy(s->lights, first->lights, (size_t)first->n_lights * sizeof(*s->lights));
-    s->n_lights = first->n_lights;
+    s->lights = malloc(lights_bytes + 1);
+    s->near = NULL;
+    s->n_near = 0;
+    s->emission = NULL;
     s->map = gn_radiance_map_ref(first->map);
-    s->has_sh = first->has_sh;
-    memcpy(s->sh, first->sh, sizeof(s->sh));
-    memcpy(s->total_irradiance, first->total_irradiance, sizeof(s->total_irradiance));
+    s->plan = NULL; // what only the next state of one probe needs
+    s->temporal = NULL;
+    s->memory = NULL;
     s->figures = times->figures;
+    s->in_time = times->in_time;
     s->sequence = times->sequence;
     s->capture_time_ns = times->capture_time_ns;
     s->published_time_ns = times->published_time_ns;
     s->ms_map = times->ms_map;
     s->ms_sh = times->ms_sh;
     s->ms_lights = times->ms_lights;
+    if (!s->lights) {
+        gn_lighting_state_unref(&s);
+        return -ENOMEM;
+    }
+    memcpy(s->lights, first->lights, lights_bytes);
     for (int i = 1; i < n; i++)
         s->others[s->n_others++] = gn_lighting_state_ref(states[i]);
     *out_state = s;

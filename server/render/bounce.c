@@ -98,6 +98,11 @@ static void try_light(const struct frame *frame, const struct walk *walk, enum g
     ++*rays;
     if (gn_rt_is_occluded(frame->rt, set, walk->org, dir, 0, INFINITY))
         return;
+    if (frame->blend.n > 1) {
+        double weights[GN_PROBES_MAX];
+        gn_blend_get_weights(&frame->blend, walk->surface.point, weights);
+        c *= (float)weights[get_probe(lights, l)];
+    }
     double radiance[3];
     for (int k = 0; k < 3; k++)
         radiance[k] = walk->surface.albedo[k] / M_PI * c * lights->irradiance[k][l] / probability;
@@ -113,7 +118,7 @@ static bool step(const struct frame *frame, struct walk *walk, enum gn_rt_set se
     if (!gn_rt_intersect(frame->rt, set, walk->org, walk->dir, 0, INFINITY, &hit)) {
         if (walk->is_specular) {
             float radiance[3];
-            gn_radiance_map_get_radiance(frame->state->map, walk->dir, radiance);
+            gn_blend_get_radiance(&frame->blend, walk->surface.point, walk->dir, radiance);
             const double wide[3] = {radiance[0], radiance[1], radiance[2]};
             add_radiance(walk, wide, sums);
         }

@@ -10,6 +10,7 @@
 #ifndef GN_SERVER_RENDER_INTERNAL_H
 #define GN_SERVER_RENDER_INTERNAL_H
 
+#include "server/light/blend.h"
 #include "server/render/render.h"
 
 /** Side of a tile, px. */
@@ -47,10 +48,11 @@ struct sample {
     float org[3]; // of rays that leave the surface: its point, moved off it
 
     // Virtual: what is seen after mirrors: a diffuse surface, or the environment's radiance.
-    bool is_lit;        // surface, org are of a diffuse surface that shading has to light
-    float through[3];   // share of its radiance that reaches the camera
-    double radiance[3]; // virtual: what the camera sees, W/(sr m^2)
-    double indirect[3]; // the part of it that came by bounces
+    bool is_lit;                  // surface, org are of a diffuse surface that shading has to light
+    float through[3];             // share of its radiance that reaches the camera
+    float weights[GN_PROBES_MAX]; // of the probes at the surface; with one probe not used
+    double radiance[3];           // virtual: what the camera sees, W/(sr m^2)
+    double indirect[3];           // the part of it that came by bounces
 
     // Real: radiance without the virtual objects (B of render.h), what they cut off it (B - C),
     // what they add (T - C). open and cut: the sums U and S over even and odd lights, W/m^2.
@@ -89,12 +91,13 @@ struct light_group {
  * with dark ones. */
 struct light_list {
     int n, capacity;
-    int n_lit;            // without the dark ones
-    float *dir[3];        // unit, world
-    float *irradiance[3]; // at normal incidence, W/m^2
-    double total[3];      // sum of irradiance
-    double *cdf;          // [n] of luminance, rising to 1; the reference's choice of lights
-    int n_groups;         // reference only: n / GROUP
+    int n_lit;               // without the dark ones
+    int ends[GN_PROBES_MAX]; // of each probe's lights, which begin where the one's before end
+    float *dir[3];           // unit, world
+    float *irradiance[3];    // at normal incidence, W/m^2
+    double total[3];         // sum of irradiance
+    double *cdf;             // [n] of luminance, rising to 1; the reference's choice of lights
+    int n_groups;            // reference only: n / GROUP
     struct light_group *groups;
     struct direction_boxes *group_boxes; // of the groups, 16 together
 };
@@ -165,9 +168,10 @@ struct receivers {
     _Alignas(64) float org[3][BATCH];
     _Alignas(64) float shading[3][BATCH]; // normals
     _Alignas(64) float geometric[3][BATCH];
-    uint16_t wanted[BATCH / LANES];  // bit i: the sums of lane i are needed
-    struct box boxes[BATCH / LANES]; // of each block's org
-    struct box box;                  // of all
+    uint16_t wanted[BATCH / LANES];                   // bit i: the sums of lane i are needed
+    _Alignas(64) float weights[GN_PROBES_MAX][BATCH]; // of the probes; with one not used
+    struct box boxes[BATCH / LANES];                  // of each block's org
+    struct box box;                                   // of all
 };
 
 /** What one worker needs for a batch, and its counts. */
@@ -206,7 +210,7 @@ struct frame {
     const struct gn_scene *scene;
     const struct gn_rt *rt;
     const struct gn_camera *camera;
-    const struct gn_lighting_state *state;
+    struct gn_blend blend; // the lighting state and its others
     struct gn_render_options options;
     struct refine_rule rule;
     double world_from_camera[9]; // rotation, row-major
@@ -326,9 +330,9 @@ void gn_directions_split(const struct direction_boxes *boxes, const float n[stat
 
 /* reference_lights.c */
 
-/** Fills list from the whole map: every texel, bright ones in parts, and what it does not show. */
-GN_MUST_USE int gn_reference_make_lights(const struct gn_radiance_map *map,
-                                         struct light_list *list);
+/** Fills list from the whole map of each probe: every texel, bright ones in parts, and what it does
+ * not show. No 16 groups are of two probes. */
+GN_MUST_USE int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list);
 
 /* reference.c */
 
@@ -367,9 +371,11 @@ void gn_render_lights_add(struct light_list *list, const double dir[static 3],
                           const double irradiance[static 3]);
 /** Adds dark lights up to the next multiple. */
 void gn_render_lights_pad(struct light_list *list, int multiple);
-/** Fills list from the state's lights; dark ones are left out. */
-GN_MUST_USE int gn_render_lights_from_state(const struct gn_lighting_state *state,
-                                            struct light_list *list);
+/** Fills list from the states' lights; dark ones are left out. Of more than GN_LIGHTS_MAX together
+ * each probe has its share, the brightest, which stand for all its light. */
+GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list);
+/** Sets the weights of samples that see a surface. */
+void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n);
 
 /* packet.c: rays into packets of 16 */
 
@@ -389,6 +395,15 @@ bool gn_box_may_meet_from_box(const struct box *box, const struct box *from,
 static inline float dot3(const float a[static 3], const float b[static 3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** Which probe's light l is. */
+static inline int get_probe(const struct light_list *lights, int l)
+{
+    int probe = 0;
+    while (l >= lights->ends[probe])
+        probe++;
+    return probe;
 }
 
 /** Cosine by which light from dir reaches the surface; 0 where either normal looks away. */

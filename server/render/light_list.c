@@ -9,6 +9,7 @@
 int gn_render_lights_reserve(struct light_list *list, int64_t capacity)
 {
     list->n = list->n_lit = list->n_groups = 0;
+    memset(list->ends, 0, sizeof(list->ends));
     memset(list->total, 0, sizeof(list->total));
     if (capacity <= list->capacity)
         return 0;
@@ -66,17 +67,53 @@ void gn_render_lights_pad(struct light_list *list, int multiple)
     }
 }
 
-int gn_render_lights_from_state(const struct gn_lighting_state *state, struct light_list *list)
+/** Adds the state's first n lights; where those are not all, scaled to the sum of all. */
+static void add_lights(const struct gn_lighting_state *state, int n, struct light_list *list)
 {
+    double all[3] = {0};
+    double some[3] = {0};
+    for (int i = 0; i < state->n_lights && n < state->n_lights; i++) {
+        for (int k = 0; k < 3; k++) {
+            all[k] += state->lights[i].irradiance[k];
+            some[k] += i < n ? state->lights[i].irradiance[k] : 0;
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        const struct gn_light *light = &state->lights[i];
+        const double dir[3] = {light->dir_world[0], light->dir_world[1], light->dir_world[2]};
+        double irradiance[3];
+        for (int k = 0; k < 3; k++)
+            irradiance[k] = light->irradiance[k] * (some[k] > 0 ? all[k] / some[k] : 1);
+        gn_render_lights_add(list, dir, irradiance);
+    }
+}
+
+int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list)
+{
+    int64_t n_all = 0;
     int ret = gn_render_lights_reserve(list, GN_LIGHTS_MAX);
     if (ret < 0)
         return ret;
-    for (int i = 0; i < state->n_lights; i++) {
-        const struct gn_light *light = &state->lights[i];
-        const double dir[3] = {light->dir_world[0], light->dir_world[1], light->dir_world[2]};
-        const double irradiance[3] = {light->irradiance[0], light->irradiance[1],
-                                      light->irradiance[2]};
-        gn_render_lights_add(list, dir, irradiance);
+    for (int i = 0; i < blend->n; i++)
+        n_all += blend->state[i]->n_lights;
+    for (int i = 0; i < blend->n; i++) {
+        int n = blend->state[i]->n_lights;
+        int share = GN_LIGHTS_MAX / blend->n;
+        add_lights(blend->state[i], n_all > GN_LIGHTS_MAX && n > share ? share : n, list);
+        list->ends[i] = list->n;
     }
     return 0;
+}
+
+void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n)
+{
+    for (int i = 0; i < n && frame->blend.n > 1; i++) {
+        struct sample *s = &samples[i];
+        double weights[GN_PROBES_MAX];
+        if (s->kind == SAMPLE_NOTHING)
+            continue;
+        gn_blend_get_weights(&frame->blend, s->surface.point, weights);
+        for (int p = 0; p < frame->blend.n; p++)
+            s->weights[p] = (float)weights[p];
+    }
 }

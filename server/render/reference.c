@@ -287,11 +287,13 @@ static void sum_group(const struct frame *frame, const struct sample *s, int g, 
     }
 }
 
-static void sum_lights(const struct frame *frame, const struct scratch *scratch,
-                       const struct sample *s, bool even, double sums[static 2][3])
+/** Of one probe's lights. */
+static void sum_probe(const struct frame *frame, const struct scratch *scratch,
+                      const struct sample *s, int probe, bool even, double sums[static 2][3])
 {
     const struct light_list *lights = frame->lights;
-    for (int first = 0; first < lights->n_groups; first += LANES) {
+    int start = probe > 0 ? lights->ends[probe - 1] : 0;
+    for (int first = start / GROUP; first < lights->ends[probe] / GROUP; first += LANES) {
         unsigned some;
         unsigned all;
         split_by_horizon(&lights->group_boxes[first / LANES], s, &some, &all);
@@ -299,6 +301,18 @@ static void sum_lights(const struct frame *frame, const struct scratch *scratch,
             if (some >> i & 1)
                 sum_group(frame, s, first + i, all >> i & 1, scratch, even, sums);
         }
+    }
+}
+
+static void sum_lights(const struct frame *frame, const struct scratch *scratch,
+                       const struct sample *s, bool even, double sums[static 2][3])
+{
+    for (int p = 0; p < frame->blend.n; p++) {
+        double part[2][3] = {{0}};
+        sum_probe(frame, scratch, s, p, even, part);
+        for (int i = 0; i < 6; i++)
+            sums[i / 3][i % 3] +=
+                part[i / 3][i % 3] * (frame->blend.n > 1 ? (double)s->weights[p] : 1);
     }
 }
 

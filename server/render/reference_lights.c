@@ -248,19 +248,24 @@ static void fill_cdf(struct light_list *list)
         list->cdf[i] /= sum;
 }
 
-int gn_reference_make_lights(const struct gn_radiance_map *map, struct light_list *list)
+static bool has_fill(const struct gn_radiance_map *map)
 {
-    int width = map->radiance.width;
-    int height = map->radiance.height;
-    bool has_fill =
-        !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
-    int64_t capacity = (int64_t)((width + 15) / 16) * ((height + 15) / 16) * GROUP + MAX_PARTS +
-                       2 * GROUP + (has_fill ? 2 * FILL_RINGS * FILL_SECTORS : 0);
-    int ret = gn_render_lights_reserve(list, capacity);
-    if (ret < 0)
-        return ret;
+    return !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
+}
+
+/** Most lights of one map. */
+static int64_t get_capacity(const struct gn_radiance_map *map)
+{
+    int64_t groups =
+        (int64_t)((map->radiance.width + 15) / 16) * ((map->radiance.height + 15) / 16);
+    return groups * GROUP + MAX_PARTS + 2 * GROUP +
+           (has_fill(map) ? 2 * FILL_RINGS * FILL_SECTORS : 0);
+}
+
+static void add_map(const struct gn_radiance_map *map, struct light_list *list)
+{
     double total[3] = {0};
-    for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
+    for (size_t i = 0; i < (size_t)map->radiance.width * (size_t)map->radiance.height; i++) {
         double irradiance[3];
         get_texel_irradiance(map, i, irradiance);
         for (int k = 0; k < 3; k++)
@@ -269,8 +274,23 @@ int gn_reference_make_lights(const struct gn_radiance_map *map, struct light_lis
     double luminance = get_luminance(total);
     add_texels(map, luminance, false, list);
     add_texels(map, luminance, true, list);
-    if (has_fill)
+    if (has_fill(map))
         add_fill(map, list);
+}
+
+int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list)
+{
+    int64_t capacity = 0;
+    for (int i = 0; i < blend->n; i++)
+        capacity += get_capacity(blend->state[i]->map) + (blend->n > 1 ? GROUP * LANES : 0);
+    int ret = gn_render_lights_reserve(list, capacity);
+    if (ret < 0)
+        return ret;
+    for (int i = 0; i < blend->n; i++) {
+        add_map(blend->state[i]->map, list);
+        gn_render_lights_pad(list, blend->n > 1 ? GROUP * LANES : GROUP);
+        list->ends[i] = list->n;
+    }
     gn_directions_fill_groups(list);
     fill_cdf(list);
     return 0;

@@ -136,7 +136,22 @@ static int reserve_texels(struct gn_renderer *renderer)
     return 0;
 }
 
-static int check_request(const struct gn_camera *camera, const struct gn_lighting_state *light,
+/** Why these states cannot light a frame, or NULL. */
+static const char *check_light(const struct gn_blend *blend,
+                               const struct gn_render_options *options)
+{
+    bool needs_sh = options->shading == GN_SHADING_IRRADIANCE_MAP;
+    for (int i = 0; i < blend->n && options->quality != GN_QUALITY_REFERENCE; i++) {
+        if (blend->state[i]->n_lights > GN_LIGHTS_MAX)
+            return "render: a lighting state has more lights than are used";
+        if (needs_sh && !blend->state[i]->has_sh)
+            return "render: irradiance shading needs the SH irradiance, which this lighting state "
+                   "leaves out";
+    }
+    return NULL;
+}
+
+static int check_request(const struct gn_camera *camera, const struct gn_blend *blend,
                          const struct gn_render_options *options, struct gn_error *out_error)
 {
     const char *reason = NULL;
@@ -155,15 +170,8 @@ static int check_request(const struct gn_camera *camera, const struct gn_lightin
     if (options->paths_per_pixel < 0 || options->paths_per_pixel > MAX_PATHS)
         return gn_error_set(out_error, -EINVAL, "render: %d paths for each pixel, must be 1 to %d",
                             options->paths_per_pixel, MAX_PATHS);
-    if (options->quality != GN_QUALITY_REFERENCE && light->n_lights > GN_LIGHTS_MAX)
-        return gn_error_set(out_error, -EINVAL, "render: %d lights, at most %d are used",
-                            light->n_lights, GN_LIGHTS_MAX);
-    if (options->quality != GN_QUALITY_REFERENCE && !light->has_sh &&
-        options->shading == GN_SHADING_IRRADIANCE_MAP)
-        return gn_error_set(out_error, -EINVAL,
-                            "render: irradiance shading needs the SH irradiance, which this "
-                            "lighting state leaves out");
-    return 0;
+    reason = check_light(blend, options);
+    return reason ? gn_error_set(out_error, -EINVAL, "%s", reason) : 0;
 }
 
 static void init_sample(const struct frame *frame, struct sample *sample, int x, int y, int part)
@@ -182,6 +190,7 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
     gn_primary_trace(frame, scratch->samples, n, figures);
     int64_t t1 = gn_clock_get_monotonic_ns();
     gn_shade_follow_mirrors(frame, scratch->samples, n, figures);
+    gn_render_weigh_probes(frame, scratch->samples, n);
     if (is_reference)
         gn_reference_shade(frame, scratch, n, n_paths, figures);
     else
@@ -464,8 +473,8 @@ static void fill_report(const struct frame *frame, int n_workers, struct gn_rend
 }
 
 static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
-                   const struct gn_lighting_state *light, enum gn_quality quality,
-                   struct gn_layers *layers, struct gn_error *out_error)
+                   const struct gn_blend *blend, enum gn_quality quality, struct gn_layers *layers,
+                   struct gn_error *out_error)
 {
     int ret = 0;
     if (layers->width != camera->width || layers->height != camera->height) {
@@ -478,8 +487,8 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     ret = reserve_pixels(renderer, camera->width, camera->height);
     if (ret == 0)
         ret = quality == GN_QUALITY_REFERENCE
-                  ? gn_reference_make_lights(light->map, &renderer->lights)
-                  : gn_render_lights_from_state(light, &renderer->lights);
+                  ? gn_reference_make_lights(blend, &renderer->lights)
+                  : gn_render_lights_from_blend(blend, &renderer->lights);
     if (ret == 0 && quality == GN_QUALITY_REFERENCE)
         ret = reserve_texels(renderer);
     if (ret < 0)
@@ -498,13 +507,14 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
     int64_t start_ns = gn_clock_get_monotonic_ns();
     if (!options)
         options = &defaults;
-    int ret = check_request(camera, light, options, out_error);
+    struct frame frame = {.camera = camera, .options = *options, .layers = layers};
+    gn_blend_init(&frame.blend, light);
+    int ret = check_request(camera, &frame.blend, options, out_error);
     if (ret == 0)
-        ret = prepare(renderer, camera, light, options->quality, layers, out_error);
+        ret = prepare(renderer, camera, &frame.blend, options->quality, layers, out_error);
     if (ret < 0)
         return ret;
 
-    struct frame frame = {.camera = camera, .state = light, .options = *options, .layers = layers};
     init_frame(&frame, renderer);
     gn_plan_make(&frame, renderer->slopes, &report);
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);

@@ -39,7 +39,7 @@ static void follow_mirrors(const struct frame *frame, struct sample *s,
         }
         if (!met) {
             float radiance[3];
-            gn_radiance_map_get_radiance(frame->state->map, dir, radiance);
+            gn_blend_get_radiance(&frame->blend, s->surface.point, dir, radiance);
             for (int k = 0; k < 3; k++)
                 s->radiance[k] = (double)s->through[k] * radiance[k];
             s->is_lit = false;
@@ -80,9 +80,14 @@ static void shade_by_irradiance_map(const struct frame *frame, struct sample *s)
 {
     const double normal[3] = {s->surface.normal_shading[0], s->surface.normal_shading[1],
                               s->surface.normal_shading[2]};
-    double e[3];
-    gn_irradiance_get(&frame->state->irradiance, normal, e);
-    reflect_irradiance(s, e);
+    double sum[3] = {0};
+    for (int p = 0; p < frame->blend.n; p++) {
+        double e[3];
+        gn_irradiance_get(&frame->blend.state[p]->irradiance, normal, e);
+        for (int k = 0; k < 3; k++)
+            sum[k] += e[k] * (frame->blend.n > 1 ? (double)s->weights[p] : 1);
+    }
+    reflect_irradiance(s, sum);
 }
 
 /** Adds the light of the packet's free lanes to their samples' irradiance. */
@@ -122,9 +127,12 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
     const struct light_list *lights = frame->lights;
     for (int l = 0; l < lights->n; l++) {
         const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
+        int probe = get_probe(lights, l);
         for (int j = 0; j < m; j++) {
             const struct sample *s = &scratch->samples[scratch->lit[j]];
             float c = surface_cosine(&s->surface, dir);
+            if (frame->blend.n > 1)
+                c *= s->weights[probe];
             if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c))
                 flush(frame, scratch, irradiance, figures);
         }

@@ -26,7 +26,7 @@ static void grow_box(struct box *box, const float p[static 3])
 }
 
 /** Arrays of the real samples; the last block is filled up with receivers that no light reaches. */
-static void gather_receivers(const struct sample *samples, int n, struct receivers *r)
+static void gather_receivers(const struct sample *samples, int n, int n_probes, struct receivers *r)
 {
     static const struct box empty = {{INFINITY, INFINITY, INFINITY},
                                      {-INFINITY, -INFINITY, -INFINITY}};
@@ -45,6 +45,8 @@ static void gather_receivers(const struct sample *samples, int n, struct receive
             r->shading[k][j] = s->surface.normal_shading[k];
             r->geometric[k][j] = s->surface.normal_geometric[k];
         }
+        for (int p = 0; p < n_probes && n_probes > 1; p++)
+            r->weights[p][j] = s->weights[p];
         grow_box(&r->boxes[j / LANES], s->org);
         grow_box(&r->box, s->org);
     }
@@ -52,6 +54,8 @@ static void gather_receivers(const struct sample *samples, int n, struct receive
     for (int j = r->n; j < r->n_blocks * LANES; j++) {
         for (int k = 0; k < 3; k++)
             r->org[k][j] = r->shading[k][j] = r->geometric[k][j] = 0;
+        for (int p = 0; p < n_probes; p++)
+            r->weights[p][j] = 0;
     }
 }
 
@@ -210,6 +214,8 @@ static void sum_block(const struct frame *frame, struct scratch *scratch, int bl
             w[i] = !(w[i] > 0) || (hidden >> i & 1)   ? 0
                    : frame->options.shadow_unweighted ? 1
                                                       : w[i];
+        for (int i = 0; i < LANES && frame->blend.n > 1; i++)
+            w[i] *= r->weights[get_probe(lights, l)][block * LANES + i];
         for (int k = 0; k < 3; k++) {
             double irradiance = lights->irradiance[k][l];
             double *sum = open[l & 1][k];
@@ -257,7 +263,7 @@ void gn_shadow_weigh(const struct frame *frame, struct sample *s)
 void gn_shadow_see_nothing(const struct frame *frame, struct sample *s)
 {
     float radiance[3];
-    gn_radiance_map_get_radiance(frame->state->map, s->dir, radiance);
+    gn_blend_get_radiance(&frame->blend, frame->origin, s->dir, radiance);
     for (int k = 0; k < 3; k++)
         s->base[k] = radiance[k];
 }
@@ -279,7 +285,7 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
     bool groups[BATCH];
     for (int i = 0; i < n; i++)
         gn_shadow_clear(&scratch->samples[i]);
-    gather_receivers(scratch->samples, n, r);
+    gather_receivers(scratch->samples, n, frame->blend.n, r);
     if (r->n == 0)
         return;
     for (int b = 0; b < r->n_blocks; b++) {
