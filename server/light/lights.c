@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/light/grid.h"
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
 
@@ -123,8 +124,10 @@ void gn_light_list_finish(struct gn_light_list *list)
 
 void gn_light_memory_destroy(struct gn_light_memory **memory)
 {
-    if (*memory)
+    if (*memory) {
+        gn_grid_plan_unref(&(*memory)->grid);
         free((*memory)->marks);
+    }
     free(*memory);
     *memory = NULL;
 }
@@ -196,7 +199,7 @@ int gn_light_settings_init(struct gn_light_settings *settings,
     s.max_ls = o->max_ls > 0 ? o->max_ls : has_aim && s.n_aim > 64 ? (s.n_aim + 7) / 8 : 8;
     s.n_samples = o->n_samples > 0 ? o->n_samples : 16 * s.division.rings * s.division.sectors;
     if (!has_aim || (s.method == GN_LIGHT_PARTITION_ENERGY && s.metric != GN_METRIC_LOG2))
-        s.n_aim = o->method == GN_LIGHT_PENROSE ? 64 : 0;
+        s.n_aim = o->method == GN_LIGHT_PARTITION_ENERGY || is_seed ? 0 : 64;
     memcpy(settings, &s, sizeof(s)); // with its padding
     return 0;
 }

@@ -11,6 +11,8 @@
 #include "server/light/partition_plan.h"
 #include "server/light/state.h"
 
+struct gn_grid_plan; // server/light/grid.h
+
 /** Sums over texels, in double. A value; zeroed: empty. */
 struct gn_patch {
     double irradiance[3]; // of L dOmega
@@ -74,7 +76,8 @@ struct gn_light_memory {
     struct gn_light_settings settings; // that it was kept under
     double figure[4];
     int n_marks;
-    uint64_t *marks; // [n_marks], owned
+    uint64_t *marks;           // [n_marks], owned
+    struct gn_grid_plan *grid; // shared (ref), may be NULL: fits any settings
 };
 /** NULL-safe; nulls *memory. */
 void gn_light_memory_destroy(struct gn_light_memory **memory);

@@ -41,5 +41,9 @@ const struct gn_light_maker *gn_light_maker_get(enum gn_light_method method);
 gn_light_make gn_partition_make_lights;
 /** The importance samples themselves, of equal power (penrose_lights.c). */
 gn_light_make gn_penrose_make_lights;
+/** Regions of equal energy, cut in half again and again (median_cut.c). */
+gn_light_make gn_median_cut_make_lights;
+/** Regions of as little spread as can be (variance.c). */
+gn_light_make gn_variance_make_lights;
 
 #endif
