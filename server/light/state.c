@@ -138,21 +138,11 @@ static int publish_smoothed(struct gn_lighting_state *state)
     return 0;
 }
 
-/* How far the harmonics went from their old values to the frame's: 1 where these are the same. */
-static double get_share(const double *old, const double *frame, const double *now)
-{
-    double way = 0, all = 0;
-    for (int i = 0; i < 3 * GN_SH_MAX; i++) {
-        way += (now[i] - old[i]) * (frame[i] - old[i]);
-        all += (frame[i] - old[i]) * (frame[i] - old[i]);
-    }
-    return all > 0 ? fmin(fmax(way / all, 0), 1) : 1;
-}
-
 static int smooth(struct gn_lighting_state *state, const struct gn_light_options *options)
 {
-    const struct gn_temporal *kept =
-        options->previous && !options->starts_stream ? options->previous->temporal : NULL;
+    const struct gn_temporal *kept = options->previous && options->previous->stream == state->stream
+                                         ? options->previous->temporal
+                                         : NULL;
     struct gn_temporal_input input = {.time_ns = state->capture_time_ns,
                                       .has_lights = state->has_lights,
                                       .n_lights = state->n_lights,
@@ -167,9 +157,9 @@ static int smooth(struct gn_lighting_state *state, const struct gn_light_options
         rc = publish_smoothed(state);
     if (rc == 0 && state->has_sh) {
         bool follows = kept && options->previous->has_sh;
-        double share = follows ? get_share(kept->values, input.values, state->temporal->values) : 1;
         gn_irradiance_follow(&state->irradiance, follows ? &options->previous->irradiance : NULL,
-                             share, (const double(*)[3])state->sh, options->irradiance.dering);
+                             state->temporal->values_share, (const double(*)[3])state->sh,
+                             options->irradiance.dering);
     }
     return rc;
 }
@@ -198,6 +188,7 @@ static int fill_state(struct gn_lighting_state *state, const struct gn_environme
     for (int c = 0; c < 3; c++)
         state->total_irradiance[c] = state->map->figures.shown_irradiance[c] +
                                      (double)state->map->fill[c] * state->map->fill_solid_angle;
+    state->stream = options->stream;
     state->sequence = frame->sequence;
     state->capture_time_ns = frame->capture_time_ns;
     if (options->smoothing > 0 && smooth(state, options) < 0)

@@ -95,9 +95,9 @@ struct gn_light_options {
                   // with the light: for still pictures, not for streams
     bool no_sh;   // leave the SH irradiance out
     struct gn_irradiance_options irradiance;
-    bool no_lights;     // leave the lights out
-    double smoothing;   // s, time constant by which light follows the frames, [0, 10]; 0: at once
-    bool starts_stream; // the frame is not of the previous state's stream: nothing is smoothed
+    bool no_lights;   // leave the lights out
+    double smoothing; // s, time constant by which light at rest follows the frames, [0, 10]; 0: off
+    uint64_t stream;  // whose frame it is; only light of the same stream is followed
     const struct gn_lighting_state *previous; // borrowed during the call, may be NULL: the last
                                               // state of the stream, whose tables are used again
 };
@@ -113,12 +113,13 @@ enum gn_temporal_verdict {
 /** Figures of the light in time. */
 struct gn_temporal_figures {
     enum gn_temporal_verdict verdict;
-    double dt_ms; // since the frame followed last; 0 where the verdict is OFF or START
-    double alpha; // share of the way to the new frame
-    int n_births; // lights that the frame has and the last one had not
-    int n_deaths; // lights that the last one had and this one has not
-    int n_snaps;  // lights that took their new value at once
-    int n_fading; // lights published that the map has no more
+    double dt_ms;  // since the frame followed last; 0 where the verdict is OFF or START
+    double tau_ms; // time constant: shorter while light changes by more than noise does
+    double alpha;  // share of the way to the new frame
+    int n_births;  // lights that the frame has and the last one had not
+    int n_deaths;  // lights that the last one had and this one has not
+    int n_snaps;   // lights that took their new value at once
+    int n_fading;  // lights published that the map has no more
 };
 
 /** What the method found. */
@@ -157,6 +158,7 @@ struct gn_lighting_state {
     int n_others;                   // [0, GN_PROBES_MAX - 1]: lights of the room's other probes
     struct gn_lighting_state *others[GN_PROBES_MAX - 1]; // [n_others] shared (ref), themselves
                                                          // without others; see server/light/blend.h
+    uint64_t stream;                                     // whose frame it was; see gn_light_options
     uint64_t sequence;                                   // of the environment frame
     int64_t capture_time_ns;
     int64_t published_time_ns;

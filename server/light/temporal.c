@@ -20,6 +20,11 @@ static const double share_black = 1e-6;
 /* Nearer to the raw value than this share of it is there: below what a float can tell. */
 static const double share_settled = 1e-7;
 
+/* Light that deviates from what is kept by more than noise does is followed within 100 ms: 90 %
+ * take 2.3 time constants. Between the two deviations the rate rises evenly. */
+static const double tau_moving = 0.04;
+static const double deviation_noise = 0.003, deviation_moving = 0.006;
+
 static double get_luminance(const double rgb[static 3])
 {
     return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
@@ -88,7 +93,7 @@ struct step {
     const struct gn_temporal *kept;
     const struct gn_temporal_input *input;
     struct gn_temporal *out; // being filled
-    double alpha;
+    double tau, alpha;
     struct gn_change change;
     struct named *names;         // [kept + input]
     int *next_of_kept, *kept_of; // [kept], [input]: the other one's place, -1: none
@@ -121,6 +126,17 @@ static void match_lights(struct step *s)
     }
 }
 
+/* The time constant for what has changed, and the share of the way that it makes. */
+static void set_pace(struct step *s, double deviation)
+{
+    double slow = 1 / s->tau, fast = fmax(slow, 1 / tau_moving);
+    double t = (deviation - deviation_noise) / (deviation_moving - deviation_noise);
+    double rate = slow + fmin(fmax(t, 0), 1) * (fast - slow);
+    struct gn_temporal_figures *f = &s->out->figures;
+    f->tau_ms = 1e3 / rate;
+    f->alpha = s->alpha = -expm1(-1e-3 * f->dt_ms * rate);
+}
+
 static void find_change(struct step *s)
 {
     double dir[3];
@@ -136,6 +152,7 @@ static void find_change(struct step *s)
         gn_change_add(&s->change, true, dir, get_luminance(light.irradiance));
     }
     gn_change_find(&s->change);
+    set_pace(s, s->change.deviation);
 }
 
 /* The light takes its end value at once; the total with it. */
@@ -289,7 +306,7 @@ static void follow_values(struct step *s)
     const struct gn_temporal_input *input = s->input;
     double scale = 0, alpha = s->change.any ? 1 : s->alpha;
     bool has_values = s->kept->input.n_values == input->n_values;
-    s->out->is_settled = true;
+    s->out->values_share = has_values ? alpha : 1;
     for (int i = 0; i < input->n_values; i++)
         scale = fmax(scale, fabs(input->values[i]));
     for (int i = 0; i < input->n_values; i++) {
@@ -302,10 +319,10 @@ static void follow_values(struct step *s)
 static void follow_lights(struct step *s)
 {
     struct gn_temporal *out = s->out;
-    for (int k = 0; k < 3; k++)
-        out->total[k] = s->kept->total[k] + s->alpha * (s->input->total[k] - s->kept->total[k]);
     match_lights(s);
     find_change(s);
+    for (int k = 0; k < 3; k++)
+        out->total[k] = s->kept->total[k] + s->alpha * (s->input->total[k] - s->kept->total[k]);
     for (int i = 0; i < s->input->n_lights; i++) {
         int kept = s->kept_of[i];
         follow(s, &s->input->lights[i], kept < 0 ? NULL : &s->kept->lights[kept]);
@@ -327,6 +344,13 @@ static void follow_total(struct step *s)
     gn_change_add(&s->change, false, up, get_luminance(s->kept->total));
     gn_change_add(&s->change, true, up, scale);
     gn_change_find(&s->change);
+    double deviation = s->change.deviation, largest = 0;
+    bool has_values = s->kept->input.n_values == s->input->n_values;
+    for (int i = 0; i < s->input->n_values; i++)
+        largest = fmax(largest, fabs(s->input->values[i]));
+    for (int i = 0; has_values && largest > 0 && i < s->input->n_values; i++)
+        deviation = fmax(deviation, fabs(s->input->values[i] - s->kept->values[i]) / largest);
+    set_pace(s, deviation);
     for (int k = 0; k < 3; k++) {
         double *total = &s->out->total[k];
         *total = s->kept->total[k];
@@ -363,6 +387,7 @@ static void start(const struct gn_temporal_input *input, struct gn_temporal *out
 {
     out->figures.verdict = GN_TEMPORAL_START;
     out->figures.alpha = 1;
+    out->values_share = 1;
     out->is_settled = true;
     memcpy(out->total, input->total, sizeof(out->total));
     memcpy(out->values, input->values, sizeof(out->values));
@@ -381,6 +406,7 @@ static struct gn_temporal *hold(const struct gn_temporal *kept)
     out->figures = (struct gn_temporal_figures){.verdict = GN_TEMPORAL_HOLD,
                                                 .n_fading = kept->figures.n_fading};
     out->n_held++;
+    out->values_share = 0;
     return out;
 }
 
@@ -408,8 +434,7 @@ int gn_temporal_follow(const struct gn_temporal *kept, const struct gn_temporal_
     } else {
         out->figures.verdict = GN_TEMPORAL_FOLLOW;
         out->figures.dt_ms = dt_ms;
-        out->figures.alpha = -expm1(-1e-3 * dt_ms / tau);
-        struct step step = {.kept = kept, .input = input, .out = out, .alpha = out->figures.alpha};
+        struct step step = {.kept = kept, .input = input, .out = out, .tau = tau};
         rc = take_step(&step);
     }
     if (rc < 0) {

@@ -51,6 +51,7 @@ struct gn_temporal {
         input; // of the last frame that it followed; its lights are those below
     double total[3];
     double values[GN_TEMPORAL_VALUES_MAX];
+    double values_share; // of the way that the values went to the frame's; 0: held, 1: all of it
     struct gn_temporal_figures figures;
     int n_held;      // frames in a row whose time did not rise
     bool is_settled; // nothing would change if the same frame came for ever

@@ -40,12 +40,15 @@ void gn_change_add(struct gn_change *change, bool is_after, const double dir[sta
 
 void gn_change_find(struct gn_change *change)
 {
-    double floor = share_changed * fmax(change->total_before, change->total_after);
+    double all = fmax(change->total_before, change->total_after), floor = share_changed * all;
     change->any = false;
+    change->deviation = 0;
     for (int i = 0; i < GN_CHANGE_WINDOWS; i++) {
         double a = change->before[i], b = change->after[i];
         change->is_changed[i] = fmax(a, b) > ratio_changed * fmin(a, b) && fabs(a - b) > floor;
         change->any = change->any || change->is_changed[i];
+        if (all > 0)
+            change->deviation = fmax(change->deviation, fabs(a - b) / all);
     }
 }
 

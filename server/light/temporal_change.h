@@ -19,6 +19,8 @@ struct gn_change {
     double middle[GN_CHANGE_WINDOWS][3]; // unit; set by gn_change_init()
     bool is_changed[GN_CHANGE_WINDOWS];  // set by gn_change_find()
     bool any;
+    double
+        deviation; // largest difference of a window's sums, as a share of the larger; set by find
 };
 
 void gn_change_init(struct gn_change *change);
