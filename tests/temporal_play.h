@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "server/light/temporal.h"
+#include "tests/unit/cmocka_setup.h"
 
 enum { PLAY_LIGHTS = 64 };
 static const double play_tau = 0.2; // s
