@@ -6,13 +6,24 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "common/image.h"
-#include "server/light/radiance_map.h"
+#include "server/light/state.h"
 
 /** In double: cmocka's own comparison rounds to float first. Fails for NaN. */
 #define assert_near(value, expected, tolerance)                                                    \
     assert_true(fabs((double)(value) - (double)(expected)) <= (double)(tolerance))
+
+/** Whether two lights are the same to the bit (padding has none). */
+static inline bool light_fixture_is_same(const struct gn_light *a, const struct gn_light *b)
+{
+    return a->id == b->id && memcmp(a->dir_world, b->dir_world, sizeof(a->dir_world)) == 0 &&
+           memcmp(a->irradiance, b->irradiance, sizeof(a->irradiance)) == 0 &&
+           memcmp(a->normal, b->normal, sizeof(a->normal)) == 0 &&
+           memcmp(&a->angular_radius, &b->angular_radius, sizeof(a->angular_radius)) == 0 &&
+           memcmp(&a->distance, &b->distance, sizeof(a->distance)) == 0;
+}
 
 /** A frame and the picture it borrows. */
 struct light_fixture {

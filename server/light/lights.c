@@ -8,7 +8,9 @@
 #include <string.h>
 
 #include "server/light/grid.h"
+#include "common/clock.h"
 #include "server/light/luminance.h"
+#include "server/light/method.h"
 #include "server/light/map_geometry.h"
 
 static const double pi = 3.14159265358979323846;
@@ -108,6 +110,7 @@ int gn_light_list_add_fill(struct gn_light_list *list, const struct gn_radiance_
         struct gn_light light;
         if (!gn_patch_get_light(&patch, &light))
             continue;
+        light.id = GN_LIGHT_ID_FILL | (uint64_t)i;
         int rc = gn_light_list_add(list, &light);
         if (rc < 0)
             return rc;
@@ -120,6 +123,19 @@ void gn_light_list_finish(struct gn_light_list *list)
 {
     free(list->lights);
     *list = (struct gn_light_list){0};
+}
+
+double gn_light_memory_follow(const struct gn_light_input *input, double kept, double fresh,
+                              double count_ratio)
+{
+    static const double time_constant_s = 1;
+    if (!(fresh < 4 * kept && kept < 4 * fresh))
+        return fresh;
+    if (count_ratio >= 0.75 && count_ratio <= 1.25)
+        return kept;
+    int64_t ns = input->map->capture_time_ns - input->previous->map->capture_time_ns;
+    double share = ns > 0 ? -expm1(-(double)ns / (double)GN_NS_PER_S / time_constant_s) : 0;
+    return kept * pow(fresh / kept, share);
 }
 
 void gn_light_memory_destroy(struct gn_light_memory **memory)

@@ -11,7 +11,8 @@
 #include "server/light/partition_plan.h"
 #include "server/light/state.h"
 
-struct gn_grid_plan; // server/light/grid.h
+struct gn_grid_plan;   // server/light/grid.h
+struct gn_light_input; // server/light/method.h
 
 /** Sums over texels, in double. A value; zeroed: empty. */
 struct gn_patch {
@@ -39,6 +40,14 @@ void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other);
  */
 bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light);
 
+/**
+ * Ids: the kind in the upper four bits, the method's own number below; samples have the highest
+ * bit. A list's ids differ.
+ */
+#define GN_LIGHT_ID_REGION (UINT64_C(1) << 60)
+#define GN_LIGHT_ID_DARK (UINT64_C(2) << 60)
+#define GN_LIGHT_ID_FILL (UINT64_C(3) << 60)
+
 /** A list that grows. Thread-safety: unsafe. */
 struct gn_light_list {
     int n, capacity;
@@ -46,7 +55,7 @@ struct gn_light_list {
 };
 /** Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_light_list_add(struct gn_light_list *list, const struct gn_light *light);
-/** One light for each cell that the map does not show, of the map's fill. */
+/** One light for each cell that the map does not show, of the map's fill; ids of the kind fill. */
 GN_MUST_USE int gn_light_list_add_fill(struct gn_light_list *list,
                                        const struct gn_radiance_map *map,
                                        const struct gn_partition_plan *plan, int *out_n);
@@ -79,6 +88,15 @@ struct gn_light_memory {
     uint64_t *marks;           // [n_marks], owned
     struct gn_grid_plan *grid; // shared (ref), may be NULL: fits any settings
 };
+/**
+ * The light's unit of a stream, against which counts are made: kept from frame to frame, so that
+ * what changes in one place changes lights there only. It follows when it no longer fits: by an
+ * exponential of time constant 1 s while the number of lights it gives, over the number wanted,
+ * lies outside [3/4, 5/4], and at once where kept and fresh differ by more than a factor of 4.
+ * count_ratio: that number with the kept unit. Returns the unit to use.
+ */
+double gn_light_memory_follow(const struct gn_light_input *input, double kept, double fresh,
+                              double count_ratio);
 /** NULL-safe; nulls *memory. */
 void gn_light_memory_destroy(struct gn_light_memory **memory);
 

@@ -108,8 +108,10 @@ static int sort_samples(struct partition *p)
 
 static int draw_samples(struct partition *p, struct gn_light_figures *figures)
 {
-    int rc = gn_map_samples_draw(p->map, p->settings->n_samples,
-                                 is_literal(p, GN_READ_PLAIN_SAMPLING), &p->samples);
+    const struct gn_map_sampling sampling = {.n_wanted = p->settings->n_samples,
+                                             .is_plain = is_literal(p, GN_READ_PLAIN_SAMPLING),
+                                             .is_relaxed = p->settings->relaxed};
+    int rc = gn_map_samples_draw(p->map, &sampling, &p->samples);
     if (rc == 0)
         rc = sort_samples(p);
     figures->n_samples = p->samples.n;

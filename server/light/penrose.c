@@ -139,11 +139,41 @@ int gn_penrose_get_level(double importance)
     return level;
 }
 
+int gn_penrose_get_phase(double importance)
+{
+    double log_importance = log1p(sqrt(5) * importance) / (2 * log(golden));
+    int phase =
+        (int)floor(GN_PENROSE_INDICES * (log_importance - gn_penrose_get_level(importance)));
+    return phase < 0 ? 0 : phase >= GN_PENROSE_INDICES ? GN_PENROSE_INDICES - 1 : phase;
+}
+
+int gn_penrose_get_structure(const struct gn_penrose_tile *tile)
+{
+    static const int weight[3][3] = {{0, 1, 2}, {0, 3, 5}, {0, 8, 13}};
+    int structure = 0;
+    for (int i = 0; i < 3; i++)
+        structure += weight[i][tile->pair[i]];
+    return structure;
+}
+
+void gn_penrose_get_corrected(const struct gn_penrose_sample *sample, const float (*row)[2],
+                              double out_position[static 2])
+{
+    const struct gn_penrose_tile *tile = &sample->tile;
+    const double *north = unit_vector[tile->direction];
+    const double *west = unit_vector[(tile->direction + 5) % 20];
+    const float *v = row[gn_penrose_get_structure(tile)];
+    const double at[2] = {sample->x, sample->y};
+    for (int c = 0; c < 2; c++)
+        out_position[c] = at[c] + tile->scale * ((double)v[0] * north[c] + (double)v[1] * west[c]);
+}
+
 struct gn_penrose_tile gn_penrose_get_root(double size)
 {
     double s = 2 * size;
     return (struct gn_penrose_tile){.type = GN_PENROSE_F,
                                     .direction = 15,
+                                    .path = 1,
                                     .scale = s,
                                     .p1 = {-s * (0.5 * golden * golden - 0.25), -s * 0.125}};
 }
@@ -183,15 +213,9 @@ static struct gn_penrose_tile make_child(const struct gn_penrose_tile *parent,
     return child;
 }
 
-int gn_penrose_split(const struct gn_penrose_tile *tile, struct gn_penrose_tile out_children[4])
+static int split_triangle(const struct gn_penrose_tile *tile, struct gn_penrose_tile *t)
 {
-    struct gn_penrose_tile *t = out_children;
     double p[3][2], q[3][2];
-    if (tile->type == GN_PENROSE_A || tile->type == GN_PENROSE_B) {
-        bool is_a = tile->type == GN_PENROSE_A;
-        t[0] = make_child(tile, is_a ? GN_PENROSE_B : GN_PENROSE_A, tile->p1, is_a ? 0 : 10, 0);
-        return 1;
-    }
     gn_penrose_get_corners(tile, p);
     switch (tile->type) {
     case GN_PENROSE_C:
@@ -223,6 +247,20 @@ int gn_penrose_split(const struct gn_penrose_tile *tile, struct gn_penrose_tile 
     }
 }
 
+int gn_penrose_split(const struct gn_penrose_tile *tile, struct gn_penrose_tile out_children[4])
+{
+    if (tile->type > GN_PENROSE_B) {
+        int n = split_triangle(tile, out_children);
+        for (int i = 0; i < n; i++)
+            out_children[i].path = 4 * tile->path + (uint64_t)i;
+        return n;
+    }
+    bool is_a = tile->type == GN_PENROSE_A;
+    out_children[0] =
+        make_child(tile, is_a ? GN_PENROSE_B : GN_PENROSE_A, tile->p1, is_a ? 0 : 10, 0);
+    return 1;
+}
+
 struct walk {
     const struct gn_penrose_importance *importance;
     int (*accept)(void *context, const struct gn_penrose_sample *sample);
@@ -230,30 +268,26 @@ struct walk {
 };
 
 /* A point keeps place and code however deep it is split: one test decides. Its chain A, B, A, ...
- * is then walked to the level that its importance requires, for what depends on the level. */
+ * is then walked to the level that its importance requires, no deeper: correction vectors are those
+ * of that level. */
 static int visit_point(const struct walk *walk, const struct gn_penrose_tile *point)
 {
-    double size = walk->importance->size, x = point->p1[0], y = point->p1[1];
+    const struct gn_penrose_importance *importance = walk->importance;
+    double size = importance->size, x = point->p1[0], y = point->p1[1];
     if (!(x >= 0 && x < size && y >= 0 && y < size))
         return 0;
-    double m = walk->importance->get_at(walk->importance->context, x, y);
-    if (!((double)point->code < m))
+    double m = importance->get_at(importance->context, x, y), threshold = m;
+    if (importance->get_threshold)
+        threshold = importance->get_threshold(importance->context, point, m);
+    if (!((double)point->code < threshold))
         return 0;
-    struct gn_penrose_tile tile = *point, child[4];
+    struct gn_penrose_sample sample = {.x = x, .y = y, .importance = m, .tile = *point};
     int level = gn_penrose_get_level(m);
-    while (tile.level < level) {
-        gn_penrose_split(&tile, child);
-        tile = child[0];
+    while (sample.tile.level < level) {
+        struct gn_penrose_tile child[4];
+        gn_penrose_split(&sample.tile, child);
+        sample.tile = child[0];
     }
-    static const int weight[3][3] = {{0, 1, 2}, {0, 3, 5}, {0, 8, 13}};
-    struct gn_penrose_sample sample = {.x = x,
-                                       .y = y,
-                                       .code = tile.code,
-                                       .level = tile.level,
-                                       .direction = tile.direction,
-                                       .scale = tile.scale};
-    for (int i = 0; i < 3; i++)
-        sample.structure += weight[i][tile.pair[i]];
     return walk->accept(walk->context, &sample);
 }
 

@@ -182,7 +182,8 @@ static void trap_5_poles_get_no_more_samples(void **unused)
     light_fixture_fill(&f, light_fixture_constant);
     assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), 0);
     struct gn_map_samples samples = {0};
-    assert_int_equal(gn_map_samples_draw(map, 4000, false, &samples), 0);
+    const struct gn_map_sampling sampling = {.n_wanted = 4000};
+    assert_int_equal(gn_map_samples_draw(map, &sampling, &samples), 0);
     enum { N_BINS = 20 }; // of equal height: of equal solid angle
     int bins[N_BINS] = {0};
     for (int i = 0; i < samples.n; i++) {

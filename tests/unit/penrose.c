@@ -141,16 +141,23 @@ static int keep(void *context, const struct gn_penrose_sample *sample)
 static void sample_even(struct even *even, double m)
 {
     *even = (struct even){.m = m};
-    struct gn_penrose_importance importance = {1, even, get_even, get_even_max};
+    const struct gn_penrose_importance importance = {
+        .size = 1, .context = even, .get_at = get_even, .get_max = get_even_max};
     assert_int_equal(gn_penrose_sample_domain(&importance, keep, even), 0);
 }
 
 static int compare_codes(const void *a, const void *b)
 {
     const struct gn_penrose_sample *p = a, *q = b;
-    if (p->code != q->code)
-        return p->code < q->code ? -1 : 1;
+    if (p->tile.code != q->tile.code)
+        return p->tile.code < q->tile.code ? -1 : 1;
     return p->x != q->x ? (p->x < q->x ? -1 : 1) : (p->y > q->y) - (p->y < q->y);
+}
+
+static int compare_paths(const void *a, const void *b)
+{
+    uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
+    return (p > q) - (p < q);
 }
 
 static void samples_nest(void **unused)
@@ -188,13 +195,14 @@ static void samples_are_taken_at_the_level_required(void **unused)
     int seen[21] = {0};
     sample_even(&even, 20000);
     for (int i = 0; i < even.n; i++) {
-        const struct gn_penrose_sample *s = &even.samples[i];
-        assert_int_equal(s->level, gn_penrose_get_level(20000));
-        assert_near(s->scale, 2 * pow(golden, -s->level), 1e-12);
-        assert_true(s->direction >= 0 && s->direction < 20);
-        assert_true(s->structure >= 0 && s->structure <= 20);
-        assert_true((double)s->code < even.m);
-        seen[s->structure]++;
+        const struct gn_penrose_tile *tile = &even.samples[i].tile;
+        int structure = gn_penrose_get_structure(tile);
+        assert_int_equal(tile->level, gn_penrose_get_level(20000));
+        assert_near(tile->scale, 2 * pow(golden, -tile->level), 1e-12);
+        assert_true(tile->direction >= 0 && tile->direction < 20);
+        assert_true(structure >= 0 && structure <= 20);
+        assert_true((double)tile->code < even.m);
+        seen[structure]++;
     }
     int n_seen = 0;
     for (int i = 0; i < 21; i++)
@@ -210,29 +218,75 @@ static void a_code_equal_to_the_importance_is_no_sample(void **unused)
     for (int m = 1; m < 400; m++) {
         sample_even(&even, m);
         for (int i = 0; i < even.n; i++) {
-            assert_true(even.samples[i].code < (uint64_t)m);
-            n_nearest += even.samples[i].code == (uint64_t)m - 1;
+            assert_true(even.samples[i].tile.code < (uint64_t)m);
+            n_nearest += even.samples[i].tile.code == (uint64_t)m - 1;
         }
     }
     assert_true(n_nearest > 0);
 }
 
-static void levels_are_exact_at_fibonacci_numbers(void **unused)
+/* m = F_n - 1, F_n, F_n + 1 for all n whose F_n + 1 a double holds, odd n in the middle of a level.
+ */
+static void levels_and_phases_are_exact_at_fibonacci_numbers(void **unused)
 {
     (void)unused;
     assert_int_equal(gn_penrose_get_level(0), 0);
     assert_int_equal(gn_penrose_get_level(376), 6);
     assert_int_equal(gn_penrose_get_level(377), 7);
-    for (int n = 2; n <= 78; n += 2) { // exact in double
-        double f = (double)gn_penrose_fibonacci(n);
-        int level = (n - 2) / 2;
-        if (f > 1)
-            assert_int_equal(gn_penrose_get_level(f - 1), level);
-        assert_int_equal(gn_penrose_get_level(f), level + 1);
-        assert_int_equal(gn_penrose_get_level(f + 1),
-                         f + 1 < (double)gn_penrose_fibonacci(n + 2) ? level + 1 : level + 2);
+    for (int n = 2; n <= 78; n++) {
+        for (int step = -1; step <= 1; step++) {
+            double m = (double)gn_penrose_fibonacci(n) + step;
+            int level = 0, phase = gn_penrose_get_phase(m);
+            while (!((double)gn_penrose_fibonacci(2 * level + 2) > m))
+                level++;
+            assert_int_equal(gn_penrose_get_level(m), level);
+            assert_true(phase >= 0 && phase < GN_PENROSE_INDICES);
+            if (n < 10 || n > 45) // far apart, and still apart in double
+                continue;
+            if (n % 2 == 0)
+                assert_int_equal(phase, step < 0 ? GN_PENROSE_INDICES - 1 : 0);
+            else
+                assert_int_equal(phase, GN_PENROSE_INDICES / 2);
+        }
+        double below = nextafter((double)gn_penrose_fibonacci(n), 0);
+        assert_true(gn_penrose_get_phase(below) == (n % 2 ? 10 : 20) || n < 10);
     }
     assert_int_equal(gn_penrose_get_level(1e300), GN_PENROSE_LEVEL_MAX);
+    assert_int_equal(gn_penrose_get_phase(1e300), GN_PENROSE_INDICES - 1);
+    int before = 0; // rises through a level, from the first to the last
+    for (double m = 377; m < 987; m += 0.25) {
+        int phase = gn_penrose_get_phase(m);
+        assert_true(phase == before || phase == before + 1);
+        before = phase;
+    }
+    assert_int_equal(before, GN_PENROSE_INDICES - 1);
+}
+
+/* A point's number is its own, and the same under every importance. */
+static void points_have_their_own_paths(void **unused)
+{
+    (void)unused;
+    static struct even even;
+    static uint64_t path_of[8192];
+    static double at[8192][2];
+    sample_even(&even, 60000);
+    int n = even.n;
+    for (int i = 0; i < n; i++) {
+        path_of[i] = even.samples[i].tile.path;
+        at[i][0] = even.samples[i].x;
+        at[i][1] = even.samples[i].y;
+        assert_true(i == 0 || path_of[i] != path_of[i - 1]);
+    }
+    sample_even(&even, 20000);
+    for (int i = 0, k = 0; i < even.n; i++, k++) { // the walk has one order
+        while (k < n && path_of[k] != even.samples[i].tile.path)
+            k++;
+        assert_true(k < n);
+        assert_true(at[k][0] == even.samples[i].x && at[k][1] == even.samples[i].y);
+    }
+    qsort(path_of, (size_t)n, sizeof(path_of[0]), compare_paths);
+    for (int i = 1; i < n; i++)
+        assert_true(path_of[i] > path_of[i - 1]);
 }
 
 static void a_hot_texel_gets_its_share(void **unused)
@@ -250,15 +304,18 @@ static void a_hot_texel_gets_its_share(void **unused)
         gn_image_at(&f.image, 300, 100)[c] = (float)(2 * acos(-1) / w);
     assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), 0);
     struct gn_map_samples samples = {0};
-    assert_int_equal(gn_map_samples_draw(map, 2000, false, &samples), 0);
-    int n_hot = 0;
-    for (int i = 0; i < samples.n; i++) {
-        n_hot += samples.texel[i] == 100 * 1024 + 300;
-        assert_true(samples.texel[i] < 1024 * 256); // nothing where nothing shines
+    for (int is_relaxed = 0; is_relaxed < 2; is_relaxed++) {
+        struct gn_map_sampling sampling = {.n_wanted = 2000, .is_relaxed = is_relaxed > 0};
+        assert_int_equal(gn_map_samples_draw(map, &sampling, &samples), 0);
+        int n_hot = 0;
+        for (int i = 0; i < samples.n; i++) {
+            n_hot += samples.texel[i] == 100 * 1024 + 300;
+            assert_true(samples.texel[i] < 1024 * 256); // nothing where nothing shines
+        }
+        assert_near((double)n_hot / samples.n, 0.5, 0.01);
+        assert_near(samples.n, 2000, 120);
+        gn_map_samples_finish(&samples);
     }
-    assert_near((double)n_hot / samples.n, 0.5, 0.01);
-    assert_near(samples.n, 2000, 120);
-    gn_map_samples_finish(&samples);
     gn_radiance_map_unref(&map);
     light_fixture_finish(&f);
 }
@@ -272,7 +329,8 @@ int main(void)
         cmocka_unit_test(density_is_known),
         cmocka_unit_test(samples_are_taken_at_the_level_required),
         cmocka_unit_test(a_code_equal_to_the_importance_is_no_sample),
-        cmocka_unit_test(levels_are_exact_at_fibonacci_numbers),
+        cmocka_unit_test(levels_and_phases_are_exact_at_fibonacci_numbers),
+        cmocka_unit_test(points_have_their_own_paths),
         cmocka_unit_test(a_hot_texel_gets_its_share),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,317 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* Importance samples as lights: their weights, their identities, and what a stream keeps. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "common/clock.h"
+#include "server/light/luminance.h"
+#include "server/light/state.h"
+#include "tests/light_fixture.h"
+
+static struct gn_lighting_state *make_state(const struct light_fixture *f,
+                                            const struct gn_light_options *options,
+                                            struct gn_pool *pool)
+{
+    struct gn_lighting_state *state = NULL;
+    struct gn_error error = {0};
+    if (gn_lighting_state_create(&f->frame, NULL, options, pool, &state, &error) < 0)
+        fail_msg("%s", error.text);
+    return state;
+}
+
+static double get_sum(const struct gn_lighting_state *state, int channel)
+{
+    double sum = 0;
+    for (int i = 0; i < state->n_lights; i++)
+        sum += (double)state->lights[i].irradiance[channel];
+    return sum;
+}
+
+static void make_room(struct light_fixture *f, enum gn_projection_type type, int width, int height)
+{
+    assert_int_equal(light_fixture_init(f, type, width, height), 0);
+    light_fixture_fill(f, light_fixture_room);
+}
+
+static void weights_add_up_to_the_map(void **unused)
+{
+    (void)unused;
+    static const double tolerance[GN_WEIGHTS_COUNT] = {1e-5, 0.06, 1e-5};
+    for (int type = 0; type < 2; type++) {
+        struct light_fixture f;
+        make_room(&f, type ? GN_PROJECTION_LATLONG : GN_PROJECTION_FISHEYE_EQUIDISTANT,
+                  type ? 200 : 120, type ? 100 : 120);
+        for (int i = 0; i < 12; i++) {
+            struct gn_light_options options = {.method = GN_LIGHT_PENROSE,
+                                               .weights = (enum gn_light_weights)(i % 3),
+                                               .relaxed = i >= 6,
+                                               .n_lights = i % 6 < 3 ? 2000 : 300};
+            struct gn_lighting_state *state = make_state(&f, &options, NULL);
+            for (int c = 0; c < 3; c++)
+                assert_near(get_sum(state, c) / state->total_irradiance[c], 1, tolerance[i % 3]);
+            gn_lighting_state_unref(&state);
+        }
+        light_fixture_finish(&f);
+    }
+}
+
+static bool is_same_way(const struct gn_light *a, const struct gn_light *b)
+{
+    return memcmp(a->dir_world, b->dir_world, sizeof(a->dir_world)) == 0;
+}
+
+/* Each texel's light goes to the nearest of all directions: against the search through all. */
+static void the_partition_is_by_the_nearest_sample(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    make_room(&f, GN_PROJECTION_ANGULAR, 90, 80);
+    f.frame.projection.center[0] = 44.1319; // no two sites are equally near to a texel
+    f.frame.projection.center[1] = 40.3171;
+    f.frame.projection.radius = 39.217;
+    f.frame.projection.focal = 0;
+    light_fixture_fill(&f, light_fixture_room);
+    struct gn_light_options options = {.method = GN_LIGHT_PENROSE, .n_lights = 90};
+    struct gn_lighting_state *sites = make_state(&f, &options, NULL);
+    options.weights = GN_WEIGHTS_PARTITION;
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    assert_int_equal(sites->n_lights, state->n_lights);
+    const struct gn_radiance_map *map = state->map;
+    double *power = calloc((size_t)state->n_lights, sizeof(*power));
+    assert_non_null(power);
+    for (int t = 0; t < 90 * 80; t++) {
+        const float *d = map->direction_world + 3 * t;
+        double best = INFINITY;
+        int nearest = 0, n_shared = 0;
+        for (int i = 0; i < sites->n_lights; i++) {
+            double squared = 0;
+            for (int c = 0; c < 3; c++)
+                squared += pow((double)sites->lights[i].dir_world[c] - (double)d[c], 2);
+            nearest = squared < best ? i : nearest;
+            best = fmin(best, squared);
+        }
+        for (int i = 0; i < sites->n_lights; i++)
+            n_shared += is_same_way(&sites->lights[i], &sites->lights[nearest]);
+        for (int i = 0; i < sites->n_lights; i++)
+            if (is_same_way(&sites->lights[i], &sites->lights[nearest]))
+                power[i] +=
+                    (double)map->solid_angle[t] * (double)map->radiance.data[3 * t] / n_shared;
+    }
+    for (int i = 0; i < state->n_lights; i++) {
+        int k = 0;
+        while (k < sites->n_lights && sites->lights[k].id != state->lights[i].id)
+            k++;
+        assert_true(k < sites->n_lights);
+        assert_near(state->lights[i].irradiance[0] / (float)power[k], 1, 1e-5);
+        assert_true(state->lights[i].angular_radius > 0);
+    }
+    free(power);
+    gn_lighting_state_unref(&sites);
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+/* More samples than texels: those of one texel share its light. */
+static void samples_without_texels_share(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 12, 12);
+    struct gn_light_options options = {
+        .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_PARTITION, .n_lights = 1500};
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    assert_true(state->n_lights > 12 * 12);
+    for (int c = 0; c < 3; c++)
+        assert_near(get_sum(state, c) / state->total_irradiance[c], 1, 1e-5);
+    for (int i = 0; i < state->n_lights; i++)
+        assert_true(gn_luminance(state->lights[i].irradiance) > 0);
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+static void threads_do_not_matter(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    struct gn_pool *pool;
+    make_room(&f, GN_PROJECTION_LATLONG, 300, 150);
+    assert_int_equal(gn_pool_create(3, &pool), 0);
+    struct gn_light_options options = {
+        .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_PARTITION, .n_lights = 200};
+    struct gn_lighting_state *one = make_state(&f, &options, NULL);
+    struct gn_lighting_state *many = make_state(&f, &options, pool);
+    assert_int_equal(one->n_lights, many->n_lights);
+    for (int i = 0; i < one->n_lights; i++)
+        assert_true(light_fixture_is_same(&one->lights[i], &many->lights[i]));
+    gn_lighting_state_unref(&one);
+    gn_lighting_state_unref(&many);
+    gn_pool_destroy(&pool);
+    light_fixture_finish(&f);
+}
+
+/* The light of that id, or NULL. */
+static const struct gn_light *find(const struct gn_lighting_state *state, uint64_t id)
+{
+    for (int i = 0; i < state->n_lights; i++)
+        if (state->lights[i].id == id)
+            return &state->lights[i];
+    return NULL;
+}
+
+static int count_new(const struct gn_lighting_state *before, const struct gn_lighting_state *after)
+{
+    int n = 0;
+    for (int i = 0; i < after->n_lights; i++)
+        n += find(before, after->lights[i].id) == NULL;
+    return n;
+}
+
+/* One more frame of the stream. */
+static void advance(const struct light_fixture *f, struct gn_light_options *options,
+                    struct gn_lighting_state **state)
+{
+    options->previous = *state;
+    struct gn_lighting_state *next = make_state(f, options, NULL);
+    gn_lighting_state_unref(state);
+    *state = next;
+}
+
+/* A lamp at +x, seen by the texels within 5 degrees. */
+static void set_lamp(struct light_fixture *f, float radiance)
+{
+    for (int y = 0; y < f->image.height; y++)
+        for (int x = 0; x < f->image.width; x++) {
+            double d[3];
+            if (gn_projection_get_direction(&f->frame.projection, x + 0.5, y + 0.5, d) &&
+                d[0] > 0.9962)
+                for (int c = 0; c < 3; c++)
+                    gn_image_at(&f->image, x, y)[c] = radiance;
+        }
+}
+
+static void a_blinking_lamp_moves_no_other_sample(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    struct gn_light_options options = {.method = GN_LIGHT_PENROSE};
+    make_room(&f, GN_PROJECTION_LATLONG, 128, 64);
+    set_lamp(&f, 0.2f);
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    struct gn_lighting_state *first = gn_lighting_state_ref(state);
+    for (int i = 1; i < 90; i++) {
+        bool is_on = i / 30 % 2 == 0;
+        f.frame.capture_time_ns += GN_NS_PER_S / 30;
+        set_lamp(&f, is_on ? 40 : 0.2f);
+        advance(&f, &options, &state);
+        int n_on_lamp = 0, n_lost = 0;
+        for (int k = 0; k < first->n_lights; k++)
+            n_lost += first->lights[k].dir_world[0] <= 0.9962f &&
+                      find(state, first->lights[k].id) == NULL;
+        assert_int_equal(n_lost, 0);
+        for (int k = 0; k < state->n_lights; k++) {
+            const struct gn_light *light = &state->lights[k];
+            const struct gn_light *before = find(first, light->id);
+            if (light->dir_world[0] > 0.9962f) {
+                n_on_lamp++;
+                continue;
+            }
+            assert_non_null(before);
+            assert_memory_equal(light->dir_world, before->dir_world, sizeof(light->dir_world));
+        }
+        assert_true(is_on ? n_on_lamp > 2 : n_on_lamp < 2);
+    }
+    gn_lighting_state_unref(&first);
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+/* Noise of 1 % of each channel. */
+static void add_noise(const struct light_fixture *clean, struct light_fixture *f, uint32_t *random)
+{
+    for (int i = 0; i < 3 * f->image.width * f->image.height; i++) {
+        float sum = 0; // of twelve even ones: a standard deviation of 1
+        for (int k = 0; k < 12; k++) {
+            *random = *random * 1664525 + 1013904223;
+            sum += (float)(*random >> 8) / (float)(1 << 24) - 0.5f;
+        }
+        f->image.data[i] = clean->image.data[i] * (1 + 0.01f * sum);
+    }
+}
+
+static void noise_bears_no_samples(void **unused)
+{
+    (void)unused;
+    struct light_fixture clean, f;
+    struct gn_light_options options = {.method = GN_LIGHT_PENROSE};
+    make_room(&clean, GN_PROJECTION_FISHEYE_EQUIDISTANT, 150, 150);
+    make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 150, 150);
+    uint32_t random = 1;
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    int n_changes = 0;
+    for (int i = 0; i < 40; i++) {
+        f.frame.capture_time_ns += GN_NS_PER_S / 30;
+        add_noise(&clean, &f, &random);
+        struct gn_lighting_state *before = gn_lighting_state_ref(state);
+        advance(&f, &options, &state);
+        n_changes += count_new(before, state) + count_new(state, before);
+        gn_lighting_state_unref(&before);
+    }
+    print_message("births and deaths in 40 frames: %d\n", n_changes);
+    assert_true(n_changes < 4); // one in ten frames
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+    light_fixture_finish(&clean);
+}
+
+/* Twice the light everywhere: the number comes back in a few seconds, at any rate as fast. */
+static void the_number_comes_back_in_time(void **unused)
+{
+    (void)unused;
+    for (int rate = 16; rate <= 256; rate *= 4) {
+        struct light_fixture f;
+        struct gn_light_options options = {.method = GN_LIGHT_PENROSE};
+        make_room(&f, GN_PROJECTION_LATLONG, 128, 64);
+        struct gn_lighting_state *state = make_state(&f, &options, NULL);
+        int n = state->n_lights;
+        for (int i = 0; i < 3 * 128 * 64; i++)
+            f.image.data[i] *= 2;
+        for (int i = 0; i < rate / 2; i++) {
+            f.frame.capture_time_ns += GN_NS_PER_S / rate;
+            advance(&f, &options, &state);
+            if (i == 0)
+                assert_true(state->n_lights > 1.7 * n);
+        }
+        double expected = n * pow(2, exp(-0.5)); // of the gap in the logarithm e^-0.5 is left
+        assert_near(state->n_lights, expected, 0.05 * expected);
+        for (int i = 0; i < 3 * 128 * 64; i++)
+            f.image.data[i] *= 1000; // at once
+        advance(&f, &options, &state);
+        assert_near(state->n_lights, n, 0.1 * n);
+        gn_lighting_state_unref(&state);
+        light_fixture_finish(&f);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(weights_add_up_to_the_map),
+        cmocka_unit_test(the_partition_is_by_the_nearest_sample),
+        cmocka_unit_test(samples_without_texels_share),
+        cmocka_unit_test(threads_do_not_matter),
+        cmocka_unit_test(a_blinking_lamp_moves_no_other_sample),
+        cmocka_unit_test(noise_bears_no_samples),
+        cmocka_unit_test(the_number_comes_back_in_time),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
