@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -138,14 +139,21 @@ double gn_light_memory_follow(const struct gn_light_input *input, double kept, d
     return kept * pow(fresh / kept, share);
 }
 
-void gn_light_memory_destroy(struct gn_light_memory **memory)
+struct gn_light_memory *gn_light_memory_ref(struct gn_light_memory *memory)
 {
-    if (*memory) {
-        gn_grid_plan_unref(&(*memory)->grid);
-        free((*memory)->marks);
-    }
-    free(*memory);
+    atomic_fetch_add_explicit(&memory->more_references, 1, memory_order_relaxed);
+    return memory;
+}
+
+void gn_light_memory_unref(struct gn_light_memory **memory)
+{
+    struct gn_light_memory *m = *memory;
     *memory = NULL;
+    if (!m || atomic_fetch_sub_explicit(&m->more_references, 1, memory_order_acq_rel) > 0)
+        return;
+    gn_grid_plan_unref(&m->grid);
+    free(m->marks);
+    free(m);
 }
 
 static bool is_in(int value, int low, int high)

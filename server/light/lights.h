@@ -82,6 +82,7 @@ struct gn_light_settings {
  * hysteresis. Only methods know what their figures and marks mean. Zeroed: nothing kept.
  */
 struct gn_light_memory {
+    _Atomic int more_references;       // besides the first
     struct gn_light_settings settings; // that it was kept under
     double figure[4];
     int n_marks;
@@ -97,8 +98,9 @@ struct gn_light_memory {
  */
 double gn_light_memory_follow(const struct gn_light_input *input, double kept, double fresh,
                               double count_ratio);
-/** NULL-safe; nulls *memory. */
-void gn_light_memory_destroy(struct gn_light_memory **memory);
+struct gn_light_memory *gn_light_memory_ref(struct gn_light_memory *memory);
+/** Drops a reference. NULL-safe; nulls *memory. */
+void gn_light_memory_unref(struct gn_light_memory **memory);
 
 /** Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_light_settings_init(struct gn_light_settings *settings,

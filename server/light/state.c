@@ -120,7 +120,9 @@ static double to_ms(int64_t duration_ns)
 }
 
 /* What follows the frames takes the place of what this one says. */
-static int publish_smoothed(struct gn_lighting_state *state)
+static int publish_smoothed(struct gn_lighting_state *state,
+                            const struct gn_lighting_state *previous,
+                            const struct gn_light_options *options)
 {
     const struct gn_temporal *t = state->temporal;
     struct gn_light *lights = malloc((size_t)t->n_lights * sizeof(*lights) + 1);
@@ -132,9 +134,14 @@ static int publish_smoothed(struct gn_lighting_state *state)
     state->lights = lights;
     state->n_lights = t->n_lights;
     memcpy(state->total_irradiance, t->total, sizeof(t->total));
-    if (state->has_sh)
-        memcpy(state->sh, t->values, sizeof(state->sh));
     state->in_time = t->figures;
+    if (!state->has_sh)
+        return 0;
+    memcpy(state->sh, t->values, sizeof(state->sh));
+    state->irradiance = state->frame_irradiance;
+    if (t->values_share < 1)
+        gn_irradiance_follow(&state->irradiance, &previous->irradiance, t->values_share,
+                             (const double(*)[3])state->sh, options->irradiance.dering);
     return 0;
 }
 
@@ -152,28 +159,17 @@ static int smooth(struct gn_lighting_state *state, const struct gn_light_options
     memcpy(input.total, state->total_irradiance, sizeof(input.total));
     if (state->has_sh)
         memcpy(input.values, state->sh, sizeof(state->sh));
+    state->frame_irradiance = state->irradiance;
     int rc = gn_temporal_follow(kept, &input, options->smoothing, &state->temporal);
-    if (rc == 0)
-        rc = publish_smoothed(state);
-    if (rc == 0 && state->has_sh) {
-        bool follows = kept && options->previous->has_sh;
-        gn_irradiance_follow(&state->irradiance, follows ? &options->previous->irradiance : NULL,
-                             state->temporal->values_share, (const double(*)[3])state->sh,
-                             options->irradiance.dering);
-    }
-    return rc;
+    return rc < 0 ? rc : publish_smoothed(state, options->previous, options);
 }
 
-static int fill_state(struct gn_lighting_state *state, const struct gn_environment_frame *frame,
-                      const struct gn_radiance_map_options *map_options,
-                      const struct gn_light_options *options, struct gn_pool *pool,
-                      struct gn_error *out_error)
+/* All but the map, which is there, and the frame's names. */
+static int fill_from_map(struct gn_lighting_state *state, const struct gn_light_options *options,
+                         struct gn_pool *pool, struct gn_error *out_error)
 {
     int64_t start_ns = gn_clock_get_monotonic_ns();
-    int rc = gn_radiance_map_create(frame, map_options, pool, &state->map, out_error);
-    if (rc < 0)
-        return rc;
-    int64_t map_ns = gn_clock_get_monotonic_ns();
+    int rc = 0;
     state->has_sh = !options->no_sh;
     if (state->has_sh && gn_irradiance_init_from_map(&state->irradiance, state->sh, state->map,
                                                      &options->irradiance, pool) < 0)
@@ -189,16 +185,30 @@ static int fill_state(struct gn_lighting_state *state, const struct gn_environme
         state->total_irradiance[c] = state->map->figures.shown_irradiance[c] +
                                      (double)state->map->fill[c] * state->map->fill_solid_angle;
     state->stream = options->stream;
-    state->sequence = frame->sequence;
-    state->capture_time_ns = frame->capture_time_ns;
     if (options->smoothing > 0 && smooth(state, options) < 0)
         return gn_error_set(out_error, -ENOMEM, "light in time: no memory");
     state->published_time_ns = gn_clock_get_monotonic_ns();
-    state->ms_map = to_ms(map_ns - start_ns);
-    state->ms_sh = to_ms(sh_ns - map_ns);
+    state->ms_sh = to_ms(sh_ns - start_ns);
     state->ms_lights = to_ms(lights_ns - sh_ns);
     state->ms_temporal = to_ms(state->published_time_ns - lights_ns);
     return 0;
+}
+
+static int check_options(const struct gn_light_options *options, struct gn_error *out_error)
+{
+    if (!(options->smoothing >= 0 && options->smoothing <= 10))
+        return gn_error_set(out_error, -EINVAL, "light options: smoothing must be 0 to 10 s");
+    return 0;
+}
+
+static struct gn_lighting_state *make_empty(struct gn_error *out_error)
+{
+    struct gn_lighting_state *state = calloc(1, sizeof(*state));
+    if (state)
+        atomic_init(&state->references, 1);
+    else
+        (void)gn_error_set(out_error, -ENOMEM, "lighting state: no memory");
+    return state;
 }
 
 int gn_lighting_state_create(const struct gn_environment_frame *frame,
@@ -213,20 +223,105 @@ int gn_lighting_state_create(const struct gn_environment_frame *frame,
         options = &defaults;
     if (map_options)
         map_copy = *map_options;
-    if (!(options->smoothing >= 0 && options->smoothing <= 10))
-        return gn_error_set(out_error, -EINVAL, "light options: smoothing must be 0 to 10 s");
     if (!map_copy.previous && options->previous)
         map_copy.previous = options->previous->map;
-    struct gn_lighting_state *state = calloc(1, sizeof(*state));
+    int rc = check_options(options, out_error);
+    struct gn_lighting_state *state = rc == 0 ? make_empty(out_error) : NULL;
     if (!state)
-        return gn_error_set(out_error, -ENOMEM, "lighting state: no memory");
-    atomic_init(&state->references, 1);
-    int rc = fill_state(state, frame, &map_copy, options, pool, out_error);
+        return rc < 0 ? rc : -ENOMEM;
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    state->sequence = frame->sequence;
+    state->capture_time_ns = frame->capture_time_ns;
+    rc = gn_radiance_map_create(frame, &map_copy, pool, &state->map, out_error);
+    state->ms_map = to_ms(gn_clock_get_monotonic_ns() - start_ns);
+    if (rc == 0)
+        rc = fill_from_map(state, options, pool, out_error);
     if (rc < 0) {
         gn_lighting_state_unref(&state);
         return rc;
     }
     *out_state = state;
+    return 0;
+}
+
+int gn_lighting_state_complete(const struct gn_lighting_state *state,
+                               const struct gn_light_options *options, struct gn_pool *pool,
+                               struct gn_lighting_state **out_state, struct gn_error *out_error)
+{
+    *out_state = NULL;
+    struct gn_light_options with_tables = *options;
+    with_tables.previous = state;
+    with_tables.stream = state->stream;
+    int rc = check_options(options, out_error);
+    struct gn_lighting_state *made = rc == 0 ? make_empty(out_error) : NULL;
+    if (!made)
+        return rc < 0 ? rc : -ENOMEM;
+    made->sequence = state->sequence;
+    made->capture_time_ns = state->capture_time_ns;
+    made->ms_map = state->ms_map;
+    made->map = gn_radiance_map_ref(state->map);
+    rc = fill_from_map(made, &with_tables, pool, out_error);
+    if (rc < 0) {
+        gn_lighting_state_unref(&made);
+        return rc;
+    }
+    *out_state = made;
+    return 0;
+}
+
+/* A state with the same light; what others share is shared. */
+static struct gn_lighting_state *copy_light(const struct gn_lighting_state *state)
+{
+    struct gn_lighting_state *copy = make_empty(NULL);
+    if (!copy)
+        return NULL;
+    copy->map = gn_radiance_map_ref(state->map);
+    copy->plan = state->plan ? gn_partition_plan_ref(state->plan) : NULL;
+    copy->memory = state->memory ? gn_light_memory_ref(state->memory) : NULL;
+    copy->has_sh = state->has_sh;
+    memcpy(copy->sh, state->sh, sizeof(copy->sh));
+    copy->irradiance = state->irradiance;
+    copy->frame_irradiance = state->frame_irradiance;
+    copy->has_lights = state->has_lights;
+    memcpy(copy->total_irradiance, state->total_irradiance, sizeof(copy->total_irradiance));
+    copy->figures = state->figures;
+    copy->lights = malloc((size_t)state->n_lights * sizeof(*copy->lights) + 1);
+    if (!copy->lights) {
+        gn_lighting_state_unref(&copy);
+        return NULL;
+    }
+    if (state->n_lights > 0)
+        memcpy(copy->lights, state->lights, (size_t)state->n_lights * sizeof(*copy->lights));
+    copy->n_lights = state->n_lights;
+    return copy;
+}
+
+int gn_lighting_state_advance(const struct gn_lighting_state *state, uint64_t sequence,
+                              int64_t capture_time_ns, const struct gn_light_options *options,
+                              struct gn_lighting_state **out_state)
+{
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    *out_state = NULL;
+    struct gn_lighting_state *copy = copy_light(state);
+    if (!copy)
+        return -ENOMEM;
+    copy->stream = state->stream;
+    copy->sequence = sequence;
+    copy->capture_time_ns = capture_time_ns;
+    int rc = 0;
+    if (state->temporal && options->smoothing > 0) {
+        rc = gn_temporal_follow_same(state->temporal, capture_time_ns, options->smoothing,
+                                     &copy->temporal);
+        if (rc == 0)
+            rc = publish_smoothed(copy, state, options);
+    }
+    if (rc < 0) {
+        gn_lighting_state_unref(&copy);
+        return rc;
+    }
+    copy->published_time_ns = gn_clock_get_monotonic_ns();
+    copy->ms_temporal = to_ms(copy->published_time_ns - start_ns);
+    *out_state = copy;
     return 0;
 }
 
@@ -242,7 +337,7 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
     *state = NULL;
     if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
         return;
-    gn_light_memory_destroy(&s->memory);
+    gn_light_memory_unref(&s->memory);
     free(s->temporal);
     for (int i = 0; i < s->n_others; i++)
         gn_lighting_state_unref(&s->others[i]);

@@ -141,6 +141,7 @@ struct gn_lighting_state {
     bool has_sh;
     double sh[GN_SH_MAX][3];         // L_lm of all light, world axes; 0 above irradiance.order
     struct gn_irradiance irradiance; // of any normal
+    struct gn_irradiance frame_irradiance; // of the frame alone, where light is smoothed
     bool has_lights;
     int n_lights;
     struct gn_light *lights; // [n_lights], owned; by falling luminance
@@ -171,6 +172,23 @@ GN_MUST_USE int gn_lighting_state_create(const struct gn_environment_frame *fram
                                          const struct gn_light_options *options,
                                          struct gn_pool *pool, struct gn_lighting_state **out_state,
                                          struct gn_error *out_error);
+/**
+ * The same light at a later time, for a frame that equals the one it was made from: map, tables and
+ * the lights before smoothing are shared; smoothing goes on. Returns 0 or -ENOMEM.
+ */
+GN_MUST_USE int gn_lighting_state_advance(const struct gn_lighting_state *state, uint64_t sequence,
+                                          int64_t capture_time_ns,
+                                          const struct gn_light_options *options,
+                                          struct gn_lighting_state **out_state);
+/**
+ * The state made anew from its map with what the options ask for now and it had left out; same
+ * sequence and time. Smoothing starts anew. Returns 0 or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_lighting_state_complete(const struct gn_lighting_state *state,
+                                           const struct gn_light_options *options,
+                                           struct gn_pool *pool,
+                                           struct gn_lighting_state **out_state,
+                                           struct gn_error *out_error);
 /**
  * A state of near light only, for a room without a probe: its map is black, sequence 0. options as
  * above, with their emission. Returns 0 or a negative errno and a sentence.
