@@ -148,7 +148,7 @@ static int choose_side(const struct gn_map_table *t)
     double n = (double)t->projection.width * (double)t->projection.height;
     double whole = t->shown_solid_angle > 0 ? n * 4 * pi / t->shown_solid_angle : n;
     int side = 8;
-    while (side < GN_GRID_SIDE_MAX && 4.0 * side * side < whole)
+    while (side < GN_GRID_SIDE_MAX && (double)side * side < whole)
         side *= 2;
     return side;
 }

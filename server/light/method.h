@@ -41,6 +41,10 @@ const struct gn_light_maker *gn_light_maker_get(enum gn_light_method method);
 gn_light_make gn_partition_make_lights;
 /** The importance samples themselves, of equal power (penrose_lights.c). */
 gn_light_make gn_penrose_make_lights;
+/** Well spread points, put where the energy is (inversion.c). */
+gn_light_make gn_inversion_make_lights;
+/** Leaves of a tree that changes where the light does (quadtree.c). */
+gn_light_make gn_quadtree_make_lights;
 /** Regions of equal energy, cut in half again and again (median_cut.c). */
 gn_light_make gn_median_cut_make_lights;
 /** Regions of as little spread as can be (variance.c). */

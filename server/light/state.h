@@ -42,6 +42,8 @@ enum gn_light_method {
     GN_LIGHT_PENROSE = 2,          // the hierarchical importance samples themselves, equal power
     GN_LIGHT_MEDIAN_CUT = 3,       // regions of equal energy
     GN_LIGHT_VARIANCE = 4,         // regions of little spread
+    GN_LIGHT_INVERSION = 5,        // well spread points, put where the energy is
+    GN_LIGHT_QUADTREE = 6,         // leaves of a tree that changes where the light does
     GN_LIGHT_METHOD_COUNT
 };
 
@@ -206,7 +208,7 @@ struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state)
 void gn_lighting_state_unref(struct gn_lighting_state **state);
 
 /** The names of all methods, as a list of choices. */
-#define GN_LIGHT_METHOD_NAMES "partition|seed|penrose|median-cut|variance"
+#define GN_LIGHT_METHOD_NAMES "partition|seed|penrose|median-cut|variance|inversion|quadtree"
 /** One of them; NULL for a bad method. */
 const char *gn_light_method_get_name(enum gn_light_method method);
 /** The method of that name, or -EINVAL. */
