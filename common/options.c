@@ -260,6 +260,12 @@ int gn_options_get_enum(const struct gn_options *options, const char *section, c
     return value->text == NULL ? -1 : value->as.integer;
 }
 
+unsigned gn_options_get_set(const struct gn_options *options, const char *section, const char *name,
+                            const char *key)
+{
+    return get_typed(options, section, name, key, GN_OPTION_SET)->as.set;
+}
+
 uint64_t gn_options_get_bytes(const struct gn_options *options, const char *section,
                               const char *name, const char *key)
 {

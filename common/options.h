@@ -22,6 +22,7 @@ enum gn_option_type {
     GN_OPTION_INT,     // whole number in [min, max]
     GN_OPTION_DOUBLE,  // finite number in [min, max]
     GN_OPTION_ENUM,    // one of choices
+    GN_OPTION_SET,     // any of choices, as a,c; or all, or none; at most 31 choices
     GN_OPTION_BYTES,   // 1048576, 512KiB, 64MiB, 2GiB; in [min, max]
     GN_OPTION_ADDRESS, // HOST:PORT, [IPV6]:PORT; port [0, 65535]
 };
@@ -37,7 +38,7 @@ struct gn_option {
     const char *flag; // command line name without "--"; NULL: section-key
     enum gn_option_type type;
     double min, max;           // for INT, DOUBLE, BYTES; both 0: no bound
-    const char *choices;       // for ENUM: "a|b|c"
+    const char *choices;       // for ENUM and SET: "a|b|c"
     const char *default_value; // as in the file; NULL: unset
     const char *value_name;    // in the help: "FILE"; NULL: from the type
     const char *help;          // plain sentences; wrapped when printed
@@ -119,6 +120,9 @@ const char *gn_options_get_string(const struct gn_options *options, const char *
 /** Index into choices. */
 int gn_options_get_enum(const struct gn_options *options, const char *section, const char *name,
                         const char *key);
+/** Bit i is set where the i-th of choices is in it. */
+unsigned gn_options_get_set(const struct gn_options *options, const char *section, const char *name,
+                            const char *key);
 uint64_t gn_options_get_bytes(const struct gn_options *options, const char *section,
                               const char *name, const char *key);
 struct gn_address gn_options_get_address(const struct gn_options *options, const char *section,

@@ -35,7 +35,8 @@ struct gn_option_value {
     int line; // where the file sets it, even if that is overridden; 0: it does not
     union {
         bool boolean;
-        int integer; // and the index into choices
+        int integer;  // and the index into choices
+        unsigned set; // bits of choices
         double number;
         uint64_t bytes;
         struct gn_address address;

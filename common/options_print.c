@@ -48,6 +48,8 @@ static const char *get_value_name(const struct gn_option *option)
         return "N";
     case GN_OPTION_ENUM:
         return option->choices;
+    case GN_OPTION_SET:
+        return "NAMES";
     case GN_OPTION_BYTES:
         return "BYTES";
     case GN_OPTION_ADDRESS:
@@ -61,7 +63,7 @@ static const char *get_value_name(const struct gn_option *option)
 /* The help, what is allowed and the default, in one paragraph. */
 static void describe(const struct gn_option *option, size_t size, char *out_text)
 {
-    char expected[256];
+    char expected[512];
     gn_option_get_expectation(option, sizeof(expected), expected);
     size_t n = (size_t)snprintf(out_text, size, "%s", option->help);
     if (option->type != GN_OPTION_STRING && n < size) {

@@ -82,9 +82,8 @@ static bool parse_bytes(const char *text, uint64_t *out_value)
     return false;
 }
 
-static bool parse_choice(const char *choices, const char *text, int *out_index)
+static bool parse_choice(const char *choices, const char *text, size_t length, int *out_index)
 {
-    size_t length = strlen(text);
     for (int i = 0;; i++) {
         size_t n = strcspn(choices, "|");
         if (n == length && strncmp(choices, text, n) == 0) {
@@ -95,6 +94,39 @@ static bool parse_choice(const char *choices, const char *text, int *out_index)
             return false;
         choices += n + 1;
     }
+}
+
+/* Takes the next name of a list of names: its length, with blanks about it left out. */
+static size_t take_name(const char **rest, const char **out_name)
+{
+    const char *name = *rest + strspn(*rest, " ");
+    size_t n = strcspn(name, ",");
+    *rest = name + n + (name[n] == ',');
+    while (n > 0 && name[n - 1] == ' ')
+        n--;
+    *out_name = name;
+    return n;
+}
+
+static bool parse_set(const char *choices, const char *text, unsigned *out_set)
+{
+    unsigned set = 0, n_choices = 1;
+    for (const char *c = choices; *c != '\0'; c++)
+        n_choices += *c == '|';
+    if (strcmp(text, "all") == 0 || strcmp(text, "none") == 0) {
+        *out_set = text[0] == 'a' ? (1u << n_choices) - 1 : 0;
+        return true;
+    }
+    for (const char *rest = text; *rest != '\0';) {
+        const char *name;
+        int index;
+        size_t n = take_name(&rest, &name);
+        if (!parse_choice(choices, name, n, &index))
+            return false;
+        set |= 1u << index;
+    }
+    *out_set = set;
+    return text[0] != '\0' && text[strlen(text) - 1] != ',';
 }
 
 int gn_address_parse(const char *text, struct gn_address *out_address)
@@ -146,7 +178,9 @@ static bool parse_value(const struct gn_option *option, const char *text,
         return parse_double(text, &out_value->as.number) &&
                is_in_range(option, out_value->as.number);
     case GN_OPTION_ENUM:
-        return parse_choice(option->choices, text, &out_value->as.integer);
+        return parse_choice(option->choices, text, strlen(text), &out_value->as.integer);
+    case GN_OPTION_SET:
+        return parse_set(option->choices, text, &out_value->as.set);
     case GN_OPTION_BYTES:
         return parse_bytes(text, &out_value->as.bytes) &&
                is_in_range(option, (double)out_value->as.bytes);
@@ -166,6 +200,19 @@ static void print_bytes(double value, size_t size, char *out)
         unit++;
     }
     snprintf(out, size, "%.0f%s", value, units[unit]);
+}
+
+/* "one of a, b, c". */
+static void print_choices(const struct gn_option *option, const char *before, const char *after,
+                          size_t size, char *out)
+{
+    size_t n = (size_t)snprintf(out, size, "%s", before);
+    for (const char *c = option->choices; *c != '\0' && n + 3 < size; c++) {
+        out[n++] = *c == '|' ? ',' : *c;
+        if (*c == '|')
+            out[n++] = ' ';
+    }
+    snprintf(out + n, size - n, "%s", after);
 }
 
 void gn_option_get_expectation(const struct gn_option *option, size_t size, char *out_text)
@@ -192,16 +239,13 @@ void gn_option_get_expectation(const struct gn_option *option, size_t size, char
     case GN_OPTION_DOUBLE:
         snprintf(out_text, size, "a number%s", range);
         return;
-    case GN_OPTION_ENUM: {
-        size_t n = (size_t)snprintf(out_text, size, "one of ");
-        for (const char *c = option->choices; *c != '\0' && n + 3 < size; c++) {
-            out_text[n++] = *c == '|' ? ',' : *c;
-            if (*c == '|')
-                out_text[n++] = ' ';
-        }
-        out_text[n] = '\0';
+    case GN_OPTION_ENUM:
+        print_choices(option, "one of ", "", size, out_text);
         return;
-    }
+    case GN_OPTION_SET:
+        print_choices(option, "names of ", " with commas between them, or all, or none", size,
+                      out_text);
+        return;
     case GN_OPTION_BYTES:
         snprintf(out_text, size, "bytes%s, as 1048576, 512KiB, 64MiB or 2GiB", range);
         return;
@@ -220,15 +264,27 @@ void gn_option_suggest(const char *name, const char *candidate,
         snprintf(best, GN_OPTIONS_MAX_LABEL, "%s", candidate);
 }
 
-/* The choice that was meant, "" where none is near. */
-static void suggest_choice(const char *choices, const char *text,
+/* The choice that was meant, "" where none is near; of a list, for its first wrong name. */
+static void suggest_choice(const struct gn_option *option, const char *text,
                            char best[static GN_OPTIONS_MAX_LABEL])
 {
-    for (const char *c = choices; *c != '\0';) {
+    char wrong[64];
+    const char *rest = text, *name = text;
+    size_t n = strlen(text);
+    int index;
+    bool is_known = option->type == GN_OPTION_SET;
+    while (is_known && *rest != '\0') {
+        n = take_name(&rest, &name);
+        is_known = parse_choice(option->choices, name, n, &index);
+    }
+    if (is_known || n >= sizeof(wrong)) // all names are, and the commas are wrong
+        return;
+    snprintf(wrong, sizeof(wrong), "%.*s", (int)n, name);
+    for (const char *c = option->choices; *c != '\0';) {
         char choice[64];
-        size_t n = strcspn(c, "|");
+        n = strcspn(c, "|");
         snprintf(choice, sizeof(choice), "%.*s", (int)n, c);
-        gn_option_suggest(text, choice, best);
+        gn_option_suggest(wrong, choice, best);
         c += n + (c[n] == '|' ? 1 : 0);
     }
 }
@@ -241,10 +297,10 @@ int gn_options_set(const struct gn_options *options, struct gn_option_instance *
     struct gn_option_value *value = &instance->values[index];
     struct gn_option_value new_value = {.rank = rank, .line = value->line};
     if (!parse_value(option, text, &new_value)) {
-        char expected[256], meant[GN_OPTIONS_MAX_LABEL] = "";
+        char expected[512], meant[GN_OPTIONS_MAX_LABEL] = "";
         gn_option_get_expectation(option, sizeof(expected), expected);
-        if (option->type == GN_OPTION_ENUM)
-            suggest_choice(option->choices, text, meant);
+        if (option->type == GN_OPTION_ENUM || option->type == GN_OPTION_SET)
+            suggest_choice(option, text, meant);
         return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s, found '%.80s'%s%s%s", where,
                             label, expected, option->is_secret ? "(hidden)" : text,
                             meant[0] == '\0' ? "" : "; did you mean '", meant,

@@ -27,8 +27,6 @@ static int get_scene_path(const struct gn_options *o, const char *room, char out
 
 static void get_light(const struct gn_options *o, const char *room, struct gn_light_options *out)
 {
-    static const enum gn_partition_metric metrics[] = {GN_METRIC_DEFAULT, GN_METRIC_POW2,
-                                                       GN_METRIC_TWICE, GN_METRIC_LOG2};
     *out = (struct gn_light_options){
         .method = (enum gn_light_method)gn_options_get_enum(o, "room", room, "light-method"),
         .n_lights = gn_options_get_int(o, "room", room, "lights"),
@@ -36,7 +34,11 @@ static void get_light(const struct gn_options *o, const char *room, struct gn_li
         .sectors = gn_options_get_int(o, "room", room, "light-sectors"),
         .max_ls = gn_options_get_int(o, "room", room, "light-max-ls"),
         .n_samples = gn_options_get_int(o, "room", room, "light-samples"),
-        .metric = metrics[gn_options_get_enum(o, "room", room, "light-metric")],
+        .metric = (enum gn_partition_metric)gn_options_get_enum(o, "room", room, "light-metric"),
+        .literal = gn_options_get_set(o, "room", room, "light-literal"),
+        .mended = gn_options_get_set(o, "room", room, "light-mended"),
+        .weights = (enum gn_light_weights)gn_options_get_enum(o, "room", room, "light-weights"),
+        .relaxed = gn_options_get_bool(o, "room", room, "light-relaxed"),
     };
 }
 

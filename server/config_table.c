@@ -74,9 +74,23 @@ static const struct gn_option table[] = {
     {ROOM, .key = "light-samples", .type = GN_OPTION_INT, .min = 0, .max = 1048576,
      .default_value = "0",
      .help = "Importance samples under the regions; 0: 16 for each region of the base division."},
-    {ROOM, .key = "light-metric", .type = GN_OPTION_ENUM, .choices = "default|pow2|twice|log2",
+    {ROOM, .key = "light-metric", .type = GN_OPTION_ENUM, .choices = GN_METRIC_NAMES,
      .default_value = "default",
      .help = "How a region's deviation becomes its number of lights; default: the method's own."},
+    {ROOM, .key = "light-literal", .type = GN_OPTION_SET, .choices = GN_READ_NAMES,
+     .default_value = "none",
+     .help = "Readings of the paper's partition taken to the letter besides the method's own "
+             "(seed: all but the last). docs/lighting.md explains each."},
+    {ROOM, .key = "light-mended", .type = GN_OPTION_SET, .choices = GN_READ_NAMES,
+     .default_value = "none",
+     .help = "Readings not taken to the letter after all; wins over light-literal."},
+    {ROOM, .key = "light-weights", .type = GN_OPTION_ENUM, .choices = GN_WEIGHTS_NAMES,
+     .default_value = "equal",
+     .help = "What each importance sample stands for (penrose): the same power; its radiance over "
+             "the samples' density; or the light of all texels nearest to it."},
+    {ROOM, .key = "light-relaxed", .type = GN_OPTION_BOOL, .default_value = "false",
+     .help = "Moves importance samples by the correction table: laid out more evenly, but they "
+             "move when the light changes. For light that stands still."},
     {ROOM, .key = "ground-albedo", .type = GN_OPTION_DOUBLE, .min = 0, .max = 1,
      .default_value = "0.2",
      .help = "Reflectance of the ground that fills the half of the sphere that a fisheye does not "

@@ -65,8 +65,17 @@ enum gn_partition_reading {
     GN_READ_BRIGHTEST = 1 << 6,      // the brightest sample is the light, not energy and centroid
     GN_READ_DISCARD_DARK = 1 << 7,   // dark regions (and the fill) give no light
     GN_READ_PLAIN_SAMPLING = 1 << 8, // importance Y, not Y dOmega/dA
-    GN_READ_ALL = (1 << 9) - 1
+    GN_READ_SEED = (1 << 9) - 1,     // the paper's own
+    GN_READ_BRIGHTEST_DIR = 1 << 9,  // between: the energy, from the brightest texel's direction
+    GN_READ_ALL = (1 << 10) - 1
 };
+/** Their names, by rising bit, as a list of choices. */
+#define GN_READ_NAMES                                                                              \
+    "unclamped|sample-mean|sample-max|strict|radius-rings|midpoint|brightest|discard-dark|"        \
+    "plain-sampling|brightest-direction"
+/** Names of enum gn_partition_metric and of enum gn_light_weights, as lists of choices. */
+#define GN_METRIC_NAMES "default|pow2|twice|log2"
+#define GN_WEIGHTS_NAMES "equal|density|partition"
 
 /** How the power is shared out among importance samples. */
 enum gn_light_weights {
@@ -90,7 +99,7 @@ struct gn_light_options {
     int max_ls;    // the paper's maxLS, [1, 4096]; default 8; n_lights / 8 where more
     int n_samples; // Penrose samples under the partition, [1, 2^20]; default 16 per base region
     enum gn_partition_metric metric; // default log2 (energy) or 2^k (seed)
-    unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: all of them)
+    unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: GN_READ_SEED)
     unsigned mended;  // GN_READ_* not taken to the letter after all
     enum gn_light_weights weights; // of importance samples as lights; default equal
     bool relaxed; // importance samples moved by the correction table: evener, but they move

@@ -67,6 +67,63 @@ static const struct gn_option table[] = {
      .type = GN_OPTION_ENUM,
      .choices = GN_LIGHT_METHOD_NAMES,
      .help = "How the map becomes lights; without it: partition, or seed with --quality seed."},
+    {.key = "light-rings",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 64,
+     .help = "Rings of the partition's base division of a hemisphere; without it: the method's "
+             "own."},
+    {.key = "light-sectors",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 256,
+     .help = "Sectors of the base division; without it: the method's own."},
+    {.key = "light-max-ls",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 4096,
+     .help = "Most lights that one region is divided into, the paper's maxLS; without it: the "
+             "method's own."},
+    {.key = "light-samples",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 1048576,
+     .help = "Importance samples under the regions; without it: 16 for each region of the base "
+             "division."},
+    {.key = "light-metric",
+     .type = GN_OPTION_ENUM,
+     .choices = GN_METRIC_NAMES,
+     .default_value = "default",
+     .help = "How a region's deviation becomes its number of lights; default: the method's own."},
+    {.key = "light-literal",
+     .type = GN_OPTION_SET,
+     .choices = GN_READ_NAMES,
+     .default_value = "none",
+     .help = "Readings of the paper's partition taken to the letter besides the method's own "
+             "(seed: all but the last). docs/lighting.md explains each."},
+    {.key = "light-mended",
+     .type = GN_OPTION_SET,
+     .choices = GN_READ_NAMES,
+     .default_value = "none",
+     .help = "Readings not taken to the letter after all; wins over --light-literal."},
+    {.key = "light-weights",
+     .type = GN_OPTION_ENUM,
+     .choices = GN_WEIGHTS_NAMES,
+     .default_value = "equal",
+     .help = "What each importance sample stands for (penrose): the same power; its radiance over "
+             "the samples' density; or the light of all texels nearest to it."},
+    {.key = "light-relaxed",
+     .type = GN_OPTION_BOOL,
+     .default_value = "true",
+     .help = "Moves importance samples by the correction table, which lays them out more evenly."},
+    {.key = "shadow-cosine",
+     .type = GN_OPTION_BOOL,
+     .default_value = "true",
+     .help = "Lights count in the shadow by the cosine of their angle; --quality seed: never."},
+    {.key = "shadow-real-blockers",
+     .type = GN_OPTION_BOOL,
+     .default_value = "true",
+     .help = "What real objects already shade is not shaded again; --quality seed: it is."},
     {.key = "bounces",
      .type = GN_OPTION_INT,
      .min = 0,
@@ -208,6 +265,26 @@ static void read_paths(struct gn_cli_request *request)
     request->composite_png = get_path(request, "composite-png");
 }
 
+static bool get_bool(const struct gn_cli_request *request, const char *key)
+{
+    return gn_options_get_bool(request->options, NULL, NULL, key);
+}
+
+/** Numbers that are not set are 0: the method's own. */
+static void read_light_readings(struct gn_cli_request *request)
+{
+    struct gn_light_options *light = &request->light;
+    light->rings = get_int(request, "light-rings");
+    light->sectors = get_int(request, "light-sectors");
+    light->max_ls = get_int(request, "light-max-ls");
+    light->n_samples = get_int(request, "light-samples");
+    light->metric = (enum gn_partition_metric)get_enum(request, "light-metric");
+    light->literal = gn_options_get_set(request->options, NULL, NULL, "light-literal");
+    light->mended = gn_options_get_set(request->options, NULL, NULL, "light-mended");
+    light->weights = (enum gn_light_weights)get_enum(request, "light-weights");
+    light->relaxed = get_bool(request, "light-relaxed");
+}
+
 static void read_numbers(struct gn_cli_request *request)
 {
     struct gn_render_options *render = &request->render;
@@ -223,6 +300,9 @@ static void read_numbers(struct gn_cli_request *request)
         request->light.method = (enum gn_light_method)get_enum(request, "light-method");
     if (is_set(request, "lights"))
         request->light.n_lights = get_int(request, "lights");
+    read_light_readings(request);
+    render->shadow_unweighted = !get_bool(request, "shadow-cosine");
+    render->shadow_ignore_real = !get_bool(request, "shadow-real-blockers");
     request->has_projection = is_set(request, "env-projection");
     if (request->has_projection)
         request->projection = (enum gn_projection_type)get_enum(request, "env-projection");

@@ -174,6 +174,11 @@ def test_threads_give_the_same_bits():
 def test_qualities_and_methods_run():
     for options in (['--quality', 'seed'], ['--quality', 'seed', '--shading', 'irradiance'],
                     ['--light-method', 'penrose', '--lights', '16'],
+                    ['--light-method', 'penrose', '--light-weights', 'partition',
+                     '--no-light-relaxed'],
+                    ['--light-literal', 'sample-mean,strict', '--light-mended', 'strict',
+                     '--light-metric', 'twice', '--light-rings', '2', '--light-sectors', '5',
+                     '--light-max-ls', '4', '--light-samples', '500'],
                     ['--quality', 'reference', '--bounces', '1', '--paths', '2', '--seed', '3']):
         check_run(*options)
         channels, _, _ = read_exr('out.exr')
@@ -251,6 +256,8 @@ def list_bad():
     yield 'lights', ['--lights', '0'], {}
     yield 'lights', ['--lights', '9999'], {}
     yield 'light-method', ['--light-method', 'magic'], {}
+    yield "did you mean 'sample-mean'?", ['--light-literal', 'strict,sample-maen'], {}
+    yield '1024 regions', ['--light-rings', '64', '--light-sectors', '256'], {}
     yield 'bounces', ['--bounces', '17', '--quality', 'reference'], {}
     yield '--bounces is for --quality reference', ['--bounces', '2'], {}
     yield 'threads', ['--threads', '-1'], {}

@@ -59,6 +59,11 @@ static const struct gn_option table[] = {
      .min = 0.1,
      .max = 10,
      .help = "Factor."},
+    {.section = "room *",
+     .key = "layers",
+     .type = GN_OPTION_SET,
+     .choices = "shadow|added|depth",
+     .help = "Layers."},
 };
 static const struct gn_program program = {
     .name = "gnomond",
@@ -354,6 +359,46 @@ static void test_argument_errors(void **unused)
     }
 }
 
+static void test_sets(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *text;
+        unsigned set;
+    } right[] = {{"depth", 4}, {"shadow,depth", 5}, {"depth , shadow", 5},     {"none", 0},
+                 {"all", 7},   {"added,added", 2},  {"shadow, added,depth", 7}};
+    for (size_t i = 0; i < sizeof(right) / sizeof(right[0]); i++) {
+        char text[128];
+        struct gn_options *o = create();
+        struct gn_error e = {0};
+        snprintf(text, sizeof(text), "[room b]\nscene=s\n[room a]\nscene=s\nlayers = %s\n",
+                 right[i].text);
+        assert_int_equal(gn_options_read_text(o, text, "g.ini", &e), 0);
+        assert_int_equal(gn_options_get_set(o, "room", "a", "layers"), right[i].set);
+        assert_int_equal(gn_options_get_set(o, "room", "b", "layers"), 0); // unset
+        gn_options_destroy(&o);
+    }
+    static const char *const wrong[][2] = {{"shadow,dept", "; did you mean 'depth'?"},
+                                           {"shadow,", ""},
+                                           {",shadow", ""},
+                                           {"all,shadow", ""},
+                                           {"shadow added", ""},
+                                           {"xyz", ""}};
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
+        char text[128], expected[256];
+        struct gn_options *o = create();
+        struct gn_error e = {0};
+        snprintf(text, sizeof(text), "[room a]\nlayers = %s\n", wrong[i][0]);
+        snprintf(expected, sizeof(expected),
+                 "g.ini:2: layers in [room a]: expected names of shadow, added, depth with commas "
+                 "between them, or all, or none, found '%s'%s",
+                 wrong[i][0], wrong[i][1]);
+        assert_int_equal(gn_options_read_text(o, text, "g.ini", &e), -EINVAL);
+        assert_string_equal(e.text, expected);
+        gn_options_destroy(&o);
+    }
+}
+
 static void test_secret(void **unused)
 {
     (void)unused;
@@ -476,6 +521,7 @@ int main(void)
         cmocka_unit_test(test_environment_errors),
         cmocka_unit_test(test_environment_of_others),
         cmocka_unit_test(test_argument_errors),
+        cmocka_unit_test(test_sets),
         cmocka_unit_test(test_secret),
         cmocka_unit_test(test_visit),
         cmocka_unit_test(test_help),
