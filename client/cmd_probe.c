@@ -32,8 +32,7 @@ static const struct gn_option option_table[] = {
     {.key = "projection",
      .flag = "projection",
      .type = GN_OPTION_ENUM,
-     .choices = "latlong|angular|mirrorball|fisheye-equidistant|fisheye-equisolid|"
-                "fisheye-orthographic|fisheye-stereographic",
+     .choices = GN_PROJECTION_NAMES,
      .value_name = "NAME",
      .help = "Instead of --setup, where everything else is at its default."},
     {.key = "first-sequence",
@@ -72,6 +71,8 @@ static void make_projection(const struct gn_projection *p, struct gn_msg_project
         [GN_PROJECTION_FISHEYE_ORTHOGRAPHIC] = GN_MSG_PROJECTION_TYPE_ORTHOGRAPHIC,
         [GN_PROJECTION_FISHEYE_STEREOGRAPHIC] = GN_MSG_PROJECTION_TYPE_STEREOGRAPHIC,
         [GN_PROJECTION_FISHEYE_KANNALA_BRANDT] = GN_MSG_PROJECTION_TYPE_KANNALA_BRANDT,
+        [GN_PROJECTION_CUBE] = GN_MSG_PROJECTION_TYPE_CUBE,
+        [GN_PROJECTION_OCTAHEDRAL] = GN_MSG_PROJECTION_TYPE_OCTAHEDRAL,
     };
     *out = (struct gn_msg_projection){
         .type = types[p->type],
@@ -83,6 +84,9 @@ static void make_projection(const struct gn_projection *p, struct gn_msg_project
         .k2 = p->k[1],
         .k3 = p->k[2],
         .k4 = p->k[3],
+        .vignetting_a = p->vignetting[0],
+        .vignetting_b = p->vignetting[1],
+        .vignetting_c = p->vignetting[2],
     };
 }
 

@@ -117,6 +117,18 @@ void gn_probe_setup_init(struct gn_probe_setup *setup)
     setup->world_from_probe.rotation[0] = 1.0;
 }
 
+static int read_vignetting(const struct gn_json *object, struct gn_projection *out,
+                           struct gn_error *out_error)
+{
+    int ret = gn_json_get_numbers(object, "vignetting", 3, out->vignetting, out_error);
+    if (ret == 0 && !gn_projection_is_radial(out->type))
+        ret = gn_json_refuse(object, "vignetting", out_error,
+                             "only fisheyes, angular maps and mirror balls have a circle to fall "
+                             "off in, not %s",
+                             gn_projection_get_name(out->type));
+    return ret;
+}
+
 static int read_projection(const struct gn_json *object, struct gn_projection *out,
                            struct gn_error *out_error)
 {
@@ -124,10 +136,7 @@ static int read_projection(const struct gn_json *object, struct gn_projection *o
     int ret = gn_json_get_string(object, "projection", &name, out_error);
     if (ret == 0 && gn_projection_from_name(name, &out->type) < 0)
         ret = gn_json_refuse(object, "projection", out_error,
-                             "'%s' is none; right would be one of latlong, angular, mirrorball, "
-                             "fisheye-equidistant, fisheye-equisolid, fisheye-orthographic, "
-                             "fisheye-stereographic, fisheye-kannala-brandt",
-                             name);
+                             "'%s' is none; right would be one of " GN_PROJECTION_NAMES, name);
     if (ret == 0 && gn_json_has(object, "width"))
         ret = gn_json_get_int(object, "width", 1, GN_IMAGE_MAX_SIDE, &out->width, out_error);
     if (ret == 0 && gn_json_has(object, "height"))
@@ -141,6 +150,8 @@ static int read_projection(const struct gn_json *object, struct gn_projection *o
                                  &out->theta_max, out_error);
     if (ret == 0 && gn_json_has(object, "k"))
         ret = gn_json_get_numbers(object, "k", 4, out->k, out_error);
+    if (ret == 0 && gn_json_has(object, "vignetting"))
+        ret = read_vignetting(object, out, out_error);
     return ret;
 }
 
@@ -161,8 +172,8 @@ int gn_probe_setup_read_json(const struct gn_json *object, struct gn_probe_setup
                              struct gn_error *out_error)
 {
     static const char *const keys[] = {
-        "projection",   "width",    "height",    "center", "radius",      "theta_max", "k",
-        "pixel_format", "response", "to_rec709", "scale",  "orientation", "position"};
+        "projection", "width",        "height",   "center",    "radius", "theta_max",   "k",
+        "vignetting", "pixel_format", "response", "to_rec709", "scale",  "orientation", "position"};
     static const char *const formats[] = {"float32", "log12", "linear16"};
     struct gn_probe_setup setup;
     gn_probe_setup_init(&setup);

@@ -30,8 +30,8 @@ void gn_probe_setup_init(struct gn_probe_setup *setup);
 
 /**
  * Reads a probe's setup: projection (needed), width, height, center, radius, theta_max, k,
- * pixel_format ("float32", "log12", "linear16"), response, to_rec709, scale, orientation, position.
- * Returns 0, or -EINVAL and a sentence that names file and key.
+ * vignetting, pixel_format ("float32", "log12", "linear16"), response, to_rec709, scale,
+ * orientation, position. Returns 0, or -EINVAL and a sentence that names file and key.
  */
 GN_MUST_USE int gn_probe_setup_read_json(const struct gn_json *object,
                                          struct gn_probe_setup *out_setup,

@@ -16,18 +16,18 @@
 /** The float of the same value; every half has one. NaN stays NaN and keeps its payload. */
 static inline float gn_half_to_float(uint16_t half)
 {
-    uint32_t sign = (uint32_t)(half & 0x8000u) << 16, exponent = (half >> 10) & 31u;
-    uint32_t mantissa = half & 0x3ffu, bits;
-    float value;
-    if (exponent == 0) { // zero and denormals: mantissa * 2^-24, exact in a float
-        value = (float)mantissa * 0x1p-24f;
-        memcpy(&bits, &value, sizeof(bits));
-        bits |= sign;
-    } else if (exponent == 31) {
-        bits = sign | 0x7f800000u | mantissa << 13;
-    } else {
-        bits = sign | (exponent + 112) << 23 | mantissa << 13;
-    }
+    /* No branch, so that loops of it vectorise: all three cases are worked out, masks choose. */
+    const uint32_t rebias = (uint32_t)(127 - 15) << 23, smallest = rebias + (1u << 23); // 2^-14
+    uint32_t sign = (uint32_t)(half & 0x8000u) << 16, exponent = half & 0x7c00u;
+    uint32_t bits = (uint32_t)(half & 0x7fffu) << 13, denormal_bits = bits + smallest;
+    uint32_t is_denormal = 0u - (exponent == 0), is_special = 0u - (exponent == 0x7c00u);
+    float denormal, base, value;
+    memcpy(&denormal, &denormal_bits, sizeof(denormal));
+    memcpy(&base, &smallest, sizeof(base));
+    denormal -= base; // exact
+    memcpy(&denormal_bits, &denormal, sizeof(denormal_bits));
+    bits += rebias + (rebias & is_special);
+    bits = (denormal_bits & is_denormal) | (bits & ~is_denormal) | sign;
     memcpy(&value, &bits, sizeof(value));
     return value;
 }

@@ -87,12 +87,9 @@ static bool is_positive(const double b[static 5], int depth)
     return is_positive(left, depth - 1) && is_positive(right, depth - 1);
 }
 
-/* True where rho rises on all of [0, theta_max]. */
-static bool kb_is_monotone(const double k[static 4], double theta_max)
+/* True where a[0] + a[1] x + ... + a[4] x^4 is positive on all of [0, 1]. */
+static bool is_polynomial_positive(const double a[static 5])
 {
-    double s = theta_max * theta_max;
-    double a[5] = {1, 3 * k[0] * s, 5 * k[1] * s * s, 7 * k[2] * s * s * s,
-                   9 * k[3] * s * s * s * s};
     static const double binomial[5][5] = {
         {1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}}; // [n][k]
     double b[5] = {0}; // b_i = sum over j <= i of C(i, j) / C(4, j) a_j
@@ -103,6 +100,14 @@ static bool kb_is_monotone(const double k[static 4], double theta_max)
             return false;
     }
     return is_positive(b, 40);
+}
+
+/* True where rho rises on all of [0, theta_max]. */
+static bool kb_is_monotone(const double k[static 4], double theta_max)
+{
+    double s = theta_max * theta_max;
+    return is_polynomial_positive((double[5]){1, 3 * k[0] * s, 5 * k[1] * s * s,
+                                              7 * k[2] * s * s * s, 9 * k[3] * s * s * s * s});
 }
 
 /* The inverse of kb_rho on [0, theta_max]: Newton, kept inside its bracket by bisection. */
@@ -178,6 +183,9 @@ static const char *check_radial(struct gn_projection *p)
         return "a stereographic fisheye needs theta_max below pi";
     if (p->type == GN_PROJECTION_FISHEYE_KANNALA_BRANDT && !kb_is_monotone(p->k, p->theta_max))
         return "the Kannala-Brandt polynomial must rise on all of [0, theta_max]";
+    const double *v = p->vignetting;
+    if (!is_polynomial_positive((double[5]){1, v[0], v[1], v[2]}))
+        return "the vignetting 1 + a r^2 + b r^4 + c r^6 must be above 0 for all r in [0, 1]";
 
     if (p->center[0] == 0 && p->center[1] == 0) {
         p->center[0] = 0.5 * p->width;
@@ -410,6 +418,19 @@ double gn_projection_get_solid_angle(const struct gn_projection *projection, int
     double sum = integrate_edge(p, x1, y0, y1) - integrate_edge(p, x0, y0, y1) +
                  integrate_edge(p, y1, x0, x1) - integrate_edge(p, y0, x0, x1);
     return fmax(sum, 0);
+}
+
+bool gn_projection_has_vignetting(const struct gn_projection *projection)
+{
+    const double *v = projection->vignetting;
+    return v[0] != 0 || v[1] != 0 || v[2] != 0;
+}
+
+double gn_projection_get_vignetting(const struct gn_projection *projection, double x, double y)
+{
+    const double *v = projection->vignetting, *center = projection->center;
+    double r = fmin(hypot(x - center[0], y - center[1]) / projection->radius, 1), s = r * r;
+    return 1 + s * (v[0] + s * (v[1] + s * v[2]));
 }
 
 bool gn_projection_step(const struct gn_projection *projection, int dx, int dy, int xy[static 2])

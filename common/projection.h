@@ -50,6 +50,9 @@ struct gn_projection {
     double theta_max; // rad, (0, pi]; default pi/2 for a fisheye, pi for angular and mirror ball
     double k[4];      // Kannala-Brandt only
     double focal;     // px; default from radius and theta_max
+    // a, b, c of the lens's fall-off V(r) = 1 + a r^2 + b r^4 + c r^6, r in radii: linear radiance
+    // is divided by it
+    double vignetting[3];
 };
 
 /**
@@ -58,12 +61,17 @@ struct gn_projection {
  * a size out of range, a number not finite, theta_max beyond the model's domain (orthographic pi/2,
  * stereographic below pi), a polynomial that does not rise up to theta_max, a radius and a focal
  * length that contradict each other, a circle that misses the picture. *projection is untouched
- * then; or a cube map that is not six squares.
+ * then; or a cube map that is not six squares, a fall-off that is not above 0 on the whole circle.
  */
 GN_MUST_USE int gn_projection_init(struct gn_projection *projection, const char **out_reason);
 
 /** True for the pictures that are a circle: fisheyes, angular map, mirror ball. */
 bool gn_projection_is_radial(enum gn_projection_type type);
+
+/** The names of all types, in their order, as a list of choices. */
+#define GN_PROJECTION_NAMES                                                                        \
+    "latlong|angular|mirrorball|fisheye-equidistant|fisheye-equisolid|fisheye-orthographic|"       \
+    "fisheye-stereographic|fisheye-kannala-brandt|cube|octahedral"
 
 /** "latlong", "angular", "mirrorball", "fisheye-equidistant", ...; NULL for a bad type. */
 const char *gn_projection_get_name(enum gn_projection_type type);
@@ -93,6 +101,12 @@ bool gn_projection_get_position(const struct gn_projection *projection, const do
  * over a picture is the shown solid angle to rounding. ix in [0, width), iy in [0, height).
  */
 double gn_projection_get_solid_angle(const struct gn_projection *projection, int ix, int iy);
+
+/** True where the lens's fall-off is anything but 1. */
+bool gn_projection_has_vignetting(const struct gn_projection *projection);
+
+/** V at picture position (x, y) px, the rim's outside the circle; > 0. */
+double gn_projection_get_vignetting(const struct gn_projection *projection, double x, double y);
 
 /**
  * Moves *xy from a pixel to the one beside it, dx and dy in {-1, 0, 1}, as the sphere goes on: a

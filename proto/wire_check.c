@@ -70,6 +70,13 @@ static int check_side(uint32_t px, const char *path, struct gn_wire_fault *fault
     return gn_wire_refuse(fault, "%s: %u px, must be in [1, %d]", path, px, GN_LIMIT_SIDE_PX);
 }
 
+/** Pictures without a circle. */
+static bool has_whole_sphere(gn_msg_projection_type_t type)
+{
+    return type == GN_MSG_PROJECTION_TYPE_LATLONG || type == GN_MSG_PROJECTION_TYPE_CUBE ||
+           type == GN_MSG_PROJECTION_TYPE_OCTAHEDRAL;
+}
+
 static int check_projection(const struct gn_msg_projection *p, struct gn_wire_fault *fault)
 {
     const char *path = "ENVIRONMENT_FRAME.projection";
@@ -90,6 +97,13 @@ static int check_projection(const struct gn_msg_projection *p, struct gn_wire_fa
         if (fabs(k[i]) > MAX_COEFFICIENT || (k[i] != 0 && !is_kannala_brandt))
             return gn_wire_refuse(fault, "%s.k%d: %g, only for KANNALA_BRANDT and at most 1e6",
                                   path, i + 1, k[i]);
+    const double v[3] = {p->vignetting_a, p->vignetting_b, p->vignetting_c};
+    for (int i = 0; i < 3; i++)
+        if (fabs(v[i]) > MAX_COEFFICIENT || (v[i] != 0 && has_whole_sphere(p->type)))
+            return gn_wire_refuse(fault,
+                                  "%s.vignetting_%c: %g, only for a circle's projection and at "
+                                  "most 1e6",
+                                  path, 'a' + i, v[i]);
     return 0;
 }
 
@@ -363,15 +377,11 @@ static void set_colour_defaults(double matrix[static 9], double *scale)
 
 static double default_theta_max(gn_msg_projection_type_t type)
 {
-    switch (type) {
-    case GN_MSG_PROJECTION_TYPE_ANGULAR:
-    case GN_MSG_PROJECTION_TYPE_MIRROR_BALL:
-        return PI;
-    case GN_MSG_PROJECTION_TYPE_LATLONG:
+    if (has_whole_sphere(type))
         return 0;
-    default:
-        return PI / 2;
-    }
+    bool is_ball =
+        type == GN_MSG_PROJECTION_TYPE_ANGULAR || type == GN_MSG_PROJECTION_TYPE_MIRROR_BALL;
+    return is_ball ? PI : PI / 2;
 }
 
 static void set_environment_defaults(struct gn_msg_environment_frame *m)

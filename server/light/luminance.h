@@ -4,10 +4,16 @@
 #ifndef GN_SERVER_LIGHT_LUMINANCE_H
 #define GN_SERVER_LIGHT_LUMINANCE_H
 
-/** Y of linear Rec.709 RGB, in double. Source: ITU-R BT.709-6, item 3.2. */
+/** Shares of R, G, B in Y. Source: ITU-R BT.709-6, item 3.2. */
+#define GN_LUMINANCE_R 0.2126
+#define GN_LUMINANCE_G 0.7152
+#define GN_LUMINANCE_B 0.0722
+
+/** Y of linear Rec.709 RGB, in double. */
 static inline double gn_luminance(const float rgb[static 3])
 {
-    return 0.2126 * (double)rgb[0] + 0.7152 * (double)rgb[1] + 0.0722 * (double)rgb[2];
+    return GN_LUMINANCE_R * (double)rgb[0] + GN_LUMINANCE_G * (double)rgb[1] +
+           GN_LUMINANCE_B * (double)rgb[2];
 }
 
 #endif

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/light/radiance_map.h"
 #include "server/light/sh.h"
 
 static const double pi = 3.14159265358979323846;
@@ -19,6 +20,8 @@ static bool is_same_projection(const struct gn_projection *a, const struct gn_pr
                    a->radius == b->radius && a->theta_max == b->theta_max;
     for (int i = 0; i < 4; i++)
         is_same = is_same && a->k[i] == b->k[i];
+    for (int i = 0; i < 3; i++)
+        is_same = is_same && a->vignetting[i] == b->vignetting[i];
     return is_same;
 }
 
@@ -96,6 +99,84 @@ static int list_rim(struct gn_map_table *t)
         t->n_rim = n;
         if (pass == 0 && n > 0 && !(t->rim = calloc((size_t)n, 2 * sizeof(*t->rim))))
             return -ENOMEM;
+    }
+    return 0;
+}
+
+/* Where each row's light begins and ends: a circle leaves no holes. */
+static int find_spans(struct gn_map_table *t)
+{
+    int width = t->projection.width, height = t->projection.height;
+    t->span = calloc((size_t)height, 2 * sizeof(*t->span));
+    if (!t->span)
+        return -ENOMEM;
+    for (int y = 0; y < height; y++) {
+        const float *row = t->solid_angle + (size_t)y * (size_t)width;
+        int begin = 0, end = width;
+        while (begin < end && !(row[begin] > 0))
+            begin++;
+        while (end > begin && !(row[end - 1] > 0))
+            end--;
+        t->span[2 * y] = begin;
+        t->span[2 * y + 1] = end;
+    }
+    return 0;
+}
+
+static int make_gain(struct gn_map_table *t)
+{
+    const struct gn_projection *p = &t->projection;
+    if (!gn_projection_has_vignetting(p))
+        return 0;
+    size_t n = (size_t)p->width * (size_t)p->height;
+    t->gain = malloc(n * sizeof(*t->gain));
+    if (!t->gain)
+        return -ENOMEM;
+    for (size_t i = 0; i < n; i++) {
+        double x = (double)(i % (size_t)p->width) + 0.5, y = (double)(i / (size_t)p->width) + 0.5;
+        t->gain[i] = (float)(1 / gn_projection_get_vignetting(p, x, y));
+    }
+    return 0;
+}
+
+static double get_upward(const struct gn_map_table *t, size_t texel)
+{
+    const float *d = t->direction_world + 3 * texel;
+    const double *a = t->axis_world;
+    double up = a[0] * (double)d[0] + a[1] * (double)d[1] + a[2] * (double)d[2];
+    return up > 0 ? up * (double)t->solid_angle[texel] : 0;
+}
+
+/* Sums read each texel's weight; the rim's weights are moved to where its light is taken from. */
+static int make_weights(struct gn_map_table *t)
+{
+    size_t n = (size_t)t->projection.width * (size_t)t->projection.height;
+    t->weight = t->solid_angle;
+    t->has_row_weights = t->projection.type == GN_PROJECTION_LATLONG ||
+                         t->projection.type == GN_PROJECTION_OCTAHEDRAL;
+    if (t->n_rim > 0) {
+        t->own_weight = malloc(n * sizeof(*t->own_weight));
+        if (!t->own_weight)
+            return -ENOMEM;
+        memcpy(t->own_weight, t->solid_angle, n * sizeof(*t->own_weight));
+        t->weight = t->own_weight;
+    }
+    if (t->fill_solid_angle > 0) {
+        t->up_weight = malloc(n * sizeof(*t->up_weight));
+        if (!t->up_weight)
+            return -ENOMEM;
+        for (size_t i = 0; i < n; i++)
+            t->up_weight[i] = (float)get_upward(t, i);
+    }
+    for (int i = 0; i < t->n_rim; i++) {
+        t->own_weight[t->rim[2 * i]] = 0;
+        if (t->up_weight)
+            t->up_weight[t->rim[2 * i]] = 0;
+    }
+    for (int i = 0; i < t->n_rim; i++) {
+        t->own_weight[t->rim[2 * i + 1]] += t->solid_angle[t->rim[2 * i]];
+        if (t->up_weight)
+            t->up_weight[t->rim[2 * i + 1]] += (float)get_upward(t, t->rim[2 * i]);
     }
     return 0;
 }
@@ -184,10 +265,10 @@ static int fill_table(struct gn_map_table *t, const struct gn_map_table *previou
     }
     fill_matrix(t);
     gn_pool_run(pool, t->projection.height, rotate_row, t);
-    if (list_rim(t) < 0)
+    if (find_spans(t) < 0 || make_gain(t) < 0 || list_rim(t) < 0)
         return -ENOMEM;
     sum_solid_angles(t);
-    return 0;
+    return make_weights(t);
 }
 
 int gn_map_table_create(const struct gn_projection *projection, const double rotation[static 4],
@@ -227,8 +308,14 @@ void gn_map_table_unref(struct gn_map_table **table)
     *table = NULL;
     if (!t || atomic_fetch_sub_explicit(&t->references, 1, memory_order_acq_rel) != 1)
         return;
-    free(atomic_load_explicit(&t->spare, memory_order_relaxed));
+    struct gn_radiance_map *spare = atomic_load_explicit(&t->spare, memory_order_relaxed);
+    if (spare)
+        gn_radiance_map_free(spare);
+    free(t->up_weight);
+    free(t->own_weight);
     free(t->rim);
+    free(t->gain);
+    free(t->span);
     free(t->direction_world);
     free(t->direction_probe);
     free(t->solid_angle);

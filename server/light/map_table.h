@@ -7,6 +7,7 @@
 #ifndef GN_SERVER_LIGHT_MAP_TABLE_H
 #define GN_SERVER_LIGHT_MAP_TABLE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/pool.h"
@@ -14,7 +15,9 @@
 #include "common/projection.h"
 #include "proto/attr.h"
 
-/** Thread-safety: immutable after create but for the spare pixels, which are atomic; shared (ref).
+struct gn_radiance_map; // server/light/radiance_map.h
+
+/** Thread-safety: immutable after create but for the spare map, which are atomic; shared (ref).
  */
 struct gn_map_table {
     _Atomic int references;
@@ -24,6 +27,14 @@ struct gn_map_table {
     float *solid_angle;         // [height][width] sr, owned
     float *direction_probe;     // [height][width][3] unit, owned
     float *direction_world;     // [height][width][3] unit, owned
+    int *span;                  // [height][2] first texel that shows light, one past the last
+    float *gain;                // [height][width], owned: 1 / vignetting; NULL: 1
+    const float *weight;        // [height][width] sr that a texel's light stands for: its own and
+                                // that of the rim's texels that take it; 0 for those
+    bool has_row_weights;       // weight is the same along each row
+    float *up_weight;           // [height][width], owned: the same, each part times max(0, d .
+                                // axis); NULL where nothing is filled
+    float *own_weight;          // weight, where it is not solid_angle; owned
     int n_rim;                  // texels cut by the circle whose centres lie outside it
     uint32_t *rim;              // [n_rim][2]: such a texel, the inner one it takes its light of
     double shown_solid_angle;   // sr
@@ -31,7 +42,8 @@ struct gn_map_table {
     double fill_harmonics[25];  // integral over them of the basis of server/light/sh.h, order 4,
                                 // probe axes
     double axis_world[3];       // optical axis; z of the frame of a whole sphere's picture
-    _Atomic(float *) spare;     // pixels of a freed map, or NULL; taken by the next one
+    _Atomic(struct gn_radiance_map *) spare; // a freed map, its pixels and rows, or NULL; taken by
+                                             // the next one
 };
 
 /**

@@ -18,12 +18,26 @@
 #include "common/response.h"
 #include "proto/attr.h"
 
+/** How the pixels of a frame lie in memory. */
+enum gn_pixel_layout {
+    GN_PIXELS_IMAGE = 0, // in `codes`
+    // in `raw`: rows from the top, no padding, little-endian
+    GN_PIXELS_RGB_F32 = 1,
+    GN_PIXELS_RGB_F16 = 2,
+    GN_PIXELS_MONO_U16 = 3, // R = G = B
+    GN_PIXELS_RGB_U16 = 4,
+    GN_PIXELS_RGB_U8 = 5,
+    GN_PIXELS_COUNT
+};
+
 /** One raw capture, as it came in. Borrowed by gn_radiance_map_create. */
 struct gn_environment_frame {
     const struct gn_image *codes; // 1, 3 or 4 channels (the 4th ignored): codes in [0, 1], or
-                                  // linear values (float frames)
-    int code_max; // 255, 4095, ... of an integer sensor format, whose code 1 is the upper rail;
-                  // 0: float frame
+                                  // linear values (float frames); NULL with a raw layout
+    enum gn_pixel_layout layout;
+    const uint8_t *raw; // [projection.height][projection.width] pixels; NULL with an image
+    int code_max; // 255, 4095, ... of an integer sensor format, whose largest code is the upper
+                  // rail; 0: float frame
     struct gn_projection projection;
     struct gn_response response;
     double world_from_probe[4]; // quaternion w, x, y, z
@@ -35,18 +49,22 @@ struct gn_environment_frame {
 /** Largest radiance a map holds, W/(sr m^2): sums over any map stay far inside float. */
 #define GN_RADIANCE_MAX 1e30f
 
-/** What a frame had to have mended, and sums over the part it shows. */
+/** What a frame had to have mended where it shows light, and sums over that part. */
 struct gn_radiance_map_figures {
     int n_nan, n_inf, n_negative; // texels with such a channel: set to 0, the neighbours' median, 0
     int n_capped;                 // texels with a channel above GN_RADIANCE_MAX: set to it
     int n_clipped;                // texels at the sensor's upper rail (code_max > 0)
-    double mean_luminance;        // solid-angle weighted over the shown part, W/(sr m^2)
+    int n_out_of_gamut;    // texels with a channel below 0 after the matrix: set to 0, the others
+                           // lowered to the same luminance
+    double mean_luminance; // solid-angle weighted over the shown part, W/(sr m^2)
     double max_luminance;
     double shown_solid_angle;   // sr
     double shown_irradiance[3]; // sum over the shown part of L dOmega, W/m^2
 };
 
+struct gn_code_table;   // server/light/code_table.h
 struct gn_map_geometry; // server/light/map_geometry.h
+struct gn_map_row;      // server/light/map_rows.h
 struct gn_map_table;    // server/light/map_table.h
 struct gn_scene;        // server/scene/scene.h
 
@@ -55,6 +73,8 @@ struct gn_radiance_map {
     _Atomic int references;
     struct gn_map_table *table;       // shared (ref) by the maps of one stream
     struct gn_map_geometry *geometry; // shared (ref) too; NULL: local model, all light is distant
+    struct gn_code_table *codes;      // shared (ref) too; NULL: float frame
+    struct gn_map_row *rows;          // [height], owned: working memory of its making
     struct gn_projection projection;
     struct gn_image radiance;     // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
     const float *solid_angle;     // [height][width] sr, 0 outside the valid circle; the table's
@@ -93,6 +113,8 @@ GN_MUST_USE int gn_radiance_map_create(const struct gn_environment_frame *frame,
 struct gn_radiance_map *gn_radiance_map_ref(struct gn_radiance_map *map);
 /** NULL-safe; nulls *map. */
 void gn_radiance_map_unref(struct gn_radiance_map **map);
+/** Of a map that its table keeps as a spare; for server/light/map_table.c. */
+void gn_radiance_map_free(struct gn_radiance_map *map);
 
 /** Radiance[3] from unit world direction, bilinear; the fill where the map does not show it. */
 void gn_radiance_map_get_radiance(const struct gn_radiance_map *map,

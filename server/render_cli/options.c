@@ -9,9 +9,6 @@
 
 // In the order of their enums.
 #define QUALITIES "interactive|seed|reference"
-#define PROJECTIONS                                                                                \
-    "latlong|angular|mirrorball|fisheye-equidistant|fisheye-equisolid|fisheye-orthographic|"       \
-    "fisheye-stereographic|fisheye-kannala-brandt"
 #define SHADINGS "lights|irradiance"
 
 static const struct gn_option table[] = {
@@ -26,13 +23,14 @@ static const struct gn_option table[] = {
              "PNG and JPEG need a response in --env-params."},
     {.key = "env-projection",
      .type = GN_OPTION_ENUM,
-     .choices = PROJECTIONS,
+     .choices = GN_PROJECTION_NAMES,
      .value_name = "NAME",
      .help = "How the picture shows the directions; without it and --env-params: latlong."},
     {.key = "env-params",
      .value_name = "FILE",
      .help = "JSON of the environment picture: projection, center [x, y] and radius in pixels, "
-             "theta_max in radians, k [k1, k2, k3, k4], pixel_format, response, to_rec709, scale, "
+             "theta_max in radians, k [k1, k2, k3, k4], vignetting [a, b, c], pixel_format, "
+             "response, to_rec709, scale, "
              "orientation [w, x, y, z] (world_from_probe), position [x, y, z] in metres."},
     {.key = "world-from-env",
      .value_name = "R00,...,R22",

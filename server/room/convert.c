@@ -114,6 +114,8 @@ int gn_convert_projection(const struct gn_msg_projection *message, int width, in
         [GN_MSG_PROJECTION_TYPE_ORTHOGRAPHIC] = GN_PROJECTION_FISHEYE_ORTHOGRAPHIC,
         [GN_MSG_PROJECTION_TYPE_STEREOGRAPHIC] = GN_PROJECTION_FISHEYE_STEREOGRAPHIC,
         [GN_MSG_PROJECTION_TYPE_KANNALA_BRANDT] = GN_PROJECTION_FISHEYE_KANNALA_BRANDT,
+        [GN_MSG_PROJECTION_TYPE_CUBE] = GN_PROJECTION_CUBE,
+        [GN_MSG_PROJECTION_TYPE_OCTAHEDRAL] = GN_PROJECTION_OCTAHEDRAL,
     };
     if (message->type <= GN_MSG_PROJECTION_TYPE_UNSPECIFIED ||
         (size_t)message->type >= GN_ARRAY_LEN(types))
@@ -127,6 +129,7 @@ int gn_convert_projection(const struct gn_msg_projection *message, int width, in
         .radius = message->radius_px,
         .theta_max = message->theta_max,
         .k = {message->k1, message->k2, message->k3, message->k4},
+        .vignetting = {message->vignetting_a, message->vignetting_b, message->vignetting_c},
     };
     if (message->focal_px > 0) {
         double unit = get_unit_radius(message);

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "common/exr.h"
-#include "common/half.h"
 #include "common/jpeg.h"
 #include "server/room/convert.h"
 
@@ -15,11 +14,6 @@ void gn_environment_decoder_finish(struct gn_environment_decoder *decoder)
     gn_image_finish(&decoder->codes);
     gn_image8_finish(&decoder->codes8);
     gn_jpeg_destroy(&decoder->jpeg);
-}
-
-static uint16_t get_u16(const uint8_t *p)
-{
-    return (uint16_t)(p[0] | p[1] << 8);
 }
 
 static float get_f32(const uint8_t *p)
@@ -31,35 +25,35 @@ static float get_f32(const uint8_t *p)
     return value;
 }
 
-/** The largest code of an integer format; 1: floats pass as they are. */
-static double get_full_scale(enum gn_msg_pixel_format format)
+/** How the light code names a format that is rows of numbers, and its largest code. */
+static enum gn_pixel_layout get_layout(enum gn_msg_pixel_format format, int *out_code_max)
 {
+    *out_code_max = 0;
     switch (format) {
+    case GN_MSG_PIXEL_FORMAT_RGB_F32:
+        return GN_PIXELS_RGB_F32;
+    case GN_MSG_PIXEL_FORMAT_RGB_F16:
+        return GN_PIXELS_RGB_F16;
     case GN_MSG_PIXEL_FORMAT_MONO12:
+        *out_code_max = 4095;
+        return GN_PIXELS_MONO_U16;
     case GN_MSG_PIXEL_FORMAT_RGB12:
-        return 4095;
+        *out_code_max = 4095;
+        return GN_PIXELS_RGB_U16;
     case GN_MSG_PIXEL_FORMAT_MONO16:
+        *out_code_max = 65535;
+        return GN_PIXELS_MONO_U16;
     case GN_MSG_PIXEL_FORMAT_RGB16:
-        return 65535;
-    case GN_MSG_PIXEL_FORMAT_JPEG:
-        return 255;
+        *out_code_max = 65535;
+        return GN_PIXELS_RGB_U16;
     default:
-        return 1;
+        return GN_PIXELS_IMAGE;
     }
 }
 
-/** Makes the image that size, keeping its memory where it is already. */
-static int resize(struct gn_image *image, int width, int height, int channels)
-{
-    if (image->width == width && image->height == height && image->channels == channels)
-        return 0;
-    gn_image_finish(image);
-    return gn_image_init(image, width, height, channels);
-}
-
-/** The formats that are rows of numbers. */
-static int decode_raw(struct gn_environment_decoder *d, const struct gn_msg_environment_frame *m,
-                      const uint8_t *pixels, size_t n_bytes, struct gn_error *error)
+/** The formats that are rows of numbers: borrowed as they are. */
+static int take_raw(const struct gn_msg_environment_frame *m, const uint8_t *pixels, size_t n_bytes,
+                    struct gn_environment_frame *frame, struct gn_error *error)
 {
     size_t pixel_bytes = gn_wire_get_pixel_bytes(m->pixel_format);
     size_t wanted = (size_t)m->width * m->height * pixel_bytes;
@@ -69,38 +63,14 @@ static int decode_raw(struct gn_environment_decoder *d, const struct gn_msg_envi
     if (n_bytes != wanted)
         return gn_error_set(error, -EINVAL, "%zu bytes of pixels, but %ux%u need %zu", n_bytes,
                             m->width, m->height, wanted);
-    bool is_mono = m->pixel_format == GN_MSG_PIXEL_FORMAT_MONO12 ||
-                   m->pixel_format == GN_MSG_PIXEL_FORMAT_MONO16;
-    if (resize(&d->codes, (int)m->width, (int)m->height, is_mono ? 1 : 3) < 0)
-        return gn_error_set(error, -ENOMEM, "out of memory for %ux%u", m->width, m->height);
-    size_t n = (size_t)m->width * m->height * (is_mono ? 1 : 3);
-    float *out = d->codes.data;
-    float scale = (float)(1 / get_full_scale(m->pixel_format));
-    unsigned largest = 0;
-    switch (m->pixel_format) {
-    case GN_MSG_PIXEL_FORMAT_RGB_F32:
-        for (size_t i = 0; i < n; i++)
-            out[i] = get_f32(pixels + 4 * i);
-        return 0;
-    case GN_MSG_PIXEL_FORMAT_RGB_F16:
-        for (size_t i = 0; i < n; i++)
-            out[i] = gn_half_to_float(get_u16(pixels + 2 * i));
-        return 0;
-    default:
-        for (size_t i = 0; i < n; i++) {
-            unsigned code = get_u16(pixels + 2 * i);
-            largest = code > largest ? code : largest;
-            out[i] = (float)code * scale;
-        }
-    }
-    if (largest > (unsigned)get_full_scale(m->pixel_format))
-        return gn_error_set(error, -EINVAL, "a code of %u in a 12-bit format: 0 to 4095 are right",
-                            largest);
+    frame->layout = get_layout(m->pixel_format, &frame->code_max);
+    frame->raw = pixels;
     return 0;
 }
 
 static int decode_jpeg(struct gn_environment_decoder *d, const struct gn_msg_environment_frame *m,
-                       const uint8_t *bytes, size_t n_bytes, struct gn_error *error)
+                       const uint8_t *bytes, size_t n_bytes, struct gn_environment_frame *frame,
+                       struct gn_error *error)
 {
     if (!d->jpeg && gn_jpeg_create(&d->jpeg) < 0)
         return gn_error_set(error, -ENOMEM, "out of memory");
@@ -116,19 +86,15 @@ static int decode_jpeg(struct gn_environment_decoder *d, const struct gn_msg_env
         if (gn_image8_init(&d->codes8, (int)m->width, (int)m->height, 3) < 0)
             return gn_error_set(error, -ENOMEM, "out of memory for %ux%u", m->width, m->height);
     }
-    if (resize(&d->codes, (int)m->width, (int)m->height, 3) < 0)
-        return gn_error_set(error, -ENOMEM, "out of memory for %ux%u", m->width, m->height);
-    rc = gn_jpeg_decode(d->jpeg, bytes, n_bytes, &d->codes8, error);
-    if (rc < 0)
-        return rc;
-    size_t n = (size_t)m->width * m->height * 3;
-    for (size_t i = 0; i < n; i++)
-        d->codes.data[i] = (float)d->codes8.data[i] * (1.0f / 255.0f);
-    return 0;
+    frame->layout = GN_PIXELS_RGB_U8;
+    frame->raw = d->codes8.data;
+    frame->code_max = 255;
+    return gn_jpeg_decode(d->jpeg, bytes, n_bytes, &d->codes8, error);
 }
 
 static int decode_exr(struct gn_environment_decoder *d, const struct gn_msg_environment_frame *m,
-                      const uint8_t *bytes, size_t n_bytes, struct gn_error *error)
+                      const uint8_t *bytes, size_t n_bytes, struct gn_environment_frame *frame,
+                      struct gn_error *error)
 {
     struct gn_exr_info info;
     int rc = gn_exr_get_info(bytes, n_bytes, &info, error);
@@ -143,6 +109,7 @@ static int decode_exr(struct gn_environment_decoder *d, const struct gn_msg_envi
         return rc;
     gn_image_finish(&d->codes);
     d->codes = image;
+    frame->codes = &d->codes;
     return 0;
 }
 
@@ -165,10 +132,7 @@ int gn_environment_decode(struct gn_environment_decoder *decoder,
     if (n_bytes == 0)
         return gn_error_set(out_error, -EINVAL, "no pixels");
 
-    double full_scale = get_full_scale(message->pixel_format);
     struct gn_environment_frame frame = {
-        .codes = &decoder->codes,
-        .code_max = full_scale > 1 ? (int)full_scale : 0,
         .capture_time_ns = message->capture_time_ns,
         .sequence = message->sequence,
     };
@@ -187,13 +151,13 @@ int gn_environment_decode(struct gn_environment_decoder *decoder,
     memcpy(frame.position, pose.translation, sizeof(frame.position));
     switch (message->pixel_format) {
     case GN_MSG_PIXEL_FORMAT_JPEG:
-        rc = decode_jpeg(decoder, message, bytes, n_bytes, out_error);
+        rc = decode_jpeg(decoder, message, bytes, n_bytes, &frame, out_error);
         break;
     case GN_MSG_PIXEL_FORMAT_EXR:
-        rc = decode_exr(decoder, message, bytes, n_bytes, out_error);
+        rc = decode_exr(decoder, message, bytes, n_bytes, &frame, out_error);
         break;
     default:
-        rc = decode_raw(decoder, message, bytes, n_bytes, out_error);
+        rc = take_raw(message, bytes, n_bytes, &frame, out_error);
     }
     if (rc == 0)
         *out_frame = frame;

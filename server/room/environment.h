@@ -16,7 +16,7 @@
 
 /** What decoding keeps from frame to frame; zero it before first use. Thread-safety: unsafe. */
 struct gn_environment_decoder {
-    struct gn_image codes;   // [height][width][1 or 3]
+    struct gn_image codes;   // of EXR
     struct gn_image8 codes8; // of JPEG
     struct gn_jpeg *jpeg;    // made by the first JPEG frame
     float table[GN_LIMIT_TABLE_ENTRIES];
@@ -24,7 +24,8 @@ struct gn_environment_decoder {
 void gn_environment_decoder_finish(struct gn_environment_decoder *decoder);
 
 /**
- * Fills *out_frame, which borrows from the decoder until the next call. Memory is taken only where
+ * Fills *out_frame, which borrows from the payload (rows of numbers are taken as they are) and from
+ * the decoder until the next call. Memory is taken only where
  * the size differs from the last frame's. Returns 0, -EINVAL and a sentence, -ENOMEM.
  */
 GN_MUST_USE int gn_environment_decode(struct gn_environment_decoder *decoder,

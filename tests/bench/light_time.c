@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "common/half.h"
 #include "server/light/state.h"
 #include "tests/light_fixture.h"
 
@@ -67,18 +68,53 @@ static void report(const char *name, struct light_fixture *f, double seconds)
     }
 }
 
+/* The fixture's picture as it comes off the wire; the caller's. */
+static uint8_t *make_raw(struct light_fixture *f, enum gn_pixel_layout layout)
+{
+    size_t n = (size_t)f->image.width * (size_t)f->image.height;
+    int n_values = layout == GN_PIXELS_MONO_U16 ? 1 : 3, value_bytes = 2;
+    if (layout == GN_PIXELS_RGB_F32)
+        value_bytes = 4;
+    if (layout == GN_PIXELS_MONO_U16 || layout == GN_PIXELS_RGB_U16) {
+        f->frame.response = (struct gn_response){// y = a + b ln(c + x) over five decades
+                                                 .type = GN_RESPONSE_LOG,
+                                                 .log_a = 0.6,
+                                                 .log_b = 0.08,
+                                                 .log_c = 0.01};
+        f->frame.code_max = 4095;
+        gn_response_from_radiance(&f->frame.response, f->image.data, (long)n);
+    }
+    uint8_t *raw = malloc(n * (size_t)(n_values * value_bytes));
+    for (size_t i = 0; raw && i < n * (size_t)n_values; i++) {
+        float v = f->image.data[n_values == 1 ? 3 * i + 1 : i];
+        uint16_t bits16 = f->frame.code_max ? (uint16_t)lrintf(v * 4095) : gn_half_from_float(v);
+        if (value_bytes == 4)
+            memcpy(raw + 4 * i, &v, 4);
+        else
+            memcpy(raw + 2 * i, &bits16, 2);
+    }
+    f->frame.layout = layout;
+    f->frame.raw = raw;
+    f->frame.codes = NULL;
+    return raw;
+}
+
 int main(int argc, char **argv)
 {
     static const struct {
         const char *name;
         enum gn_projection_type type;
         int width, height;
-        bool is_log;
+        enum gn_pixel_layout layout; // 16 bits: the codes of a log sensor, 12 of them used
     } cases[] = {
-        {"fisheye 300x300 float", GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300, false},
-        {"fisheye 300x300 log 12 bit", GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300, true},
-        {"latlong 1024x512 float", GN_PROJECTION_LATLONG, 1024, 512, false},
-        {"latlong 2048x1024 float", GN_PROJECTION_LATLONG, 2048, 1024, false},
+        {"fisheye 300x300 float", GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300, GN_PIXELS_RGB_F32},
+        {"fisheye 300x300 log 12 bit", GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300,
+         GN_PIXELS_MONO_U16},
+        {"latlong 1024x512 float", GN_PROJECTION_LATLONG, 1024, 512, GN_PIXELS_RGB_F32},
+        {"latlong 1024x512 log 12 bit", GN_PROJECTION_LATLONG, 1024, 512, GN_PIXELS_RGB_U16},
+        {"latlong 2048x1024 float", GN_PROJECTION_LATLONG, 2048, 1024, GN_PIXELS_RGB_F32},
+        {"latlong 2048x1024 half", GN_PROJECTION_LATLONG, 2048, 1024, GN_PIXELS_RGB_F16},
+        {"latlong 2048x1024 log 12 bit", GN_PROJECTION_LATLONG, 2048, 1024, GN_PIXELS_RGB_U16},
     };
     double seconds = argc > 1 ? strtod(argv[1], NULL) : 0.3;
     printf("%-28s %-10s %7s %8s %8s %8s %8s %6s\n", "median ms, one thread", "method", "lights",
@@ -88,15 +124,11 @@ int main(int argc, char **argv)
         if (light_fixture_init(&f, cases[i].type, cases[i].width, cases[i].height) < 0)
             return 1;
         light_fixture_fill(&f, light_fixture_room);
-        if (cases[i].is_log) { // y = a + b ln(c + x) over five decades
-            struct gn_response response = {
-                .type = GN_RESPONSE_LOG, .log_a = 0.6, .log_b = 0.08, .log_c = 0.01};
-            gn_response_from_radiance(&response, f.image.data,
-                                      (long)f.image.width * f.image.height);
-            f.frame.response = response;
-            f.frame.code_max = 4095;
-        }
+        uint8_t *raw = make_raw(&f, cases[i].layout);
+        if (!raw)
+            return 1;
         report(cases[i].name, &f, seconds);
+        free(raw);
         light_fixture_finish(&f);
     }
     return 0;

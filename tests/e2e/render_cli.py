@@ -266,7 +266,7 @@ def list_bad():
     yield 'nine numbers', ['--world-from-env', '1,0,0,0,1,0,0,0,nan'], {}
     yield 'no rotation', ['--world-from-env', '1,0,0,0,1,0,0,0,-1'], {}
     yield 'no rotation', ['--world-from-env', '0,0,0,0,0,0,0,0,0'], {}
-    yield 'env-projection', ['--env-projection', 'cube'], {}
+    yield 'env-projection', ['--env-projection', 'square'], {}
     yield 'codes', [], {'env': 'grey.png'}
     yield 'zero.hdr', [], file_of('env', 'zero.hdr', b'#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 4\n')
     yield 'cut.hdr', [], file_of('env', 'cut.hdr', make_hdr(32, 16)[:200])
@@ -283,7 +283,7 @@ def list_bad():
     yield 'width', [], camera_with(width=1000000)
     yield 'fx', [], camera_with(fx=-1)
     yield 'world_from_camera', [], camera_with(world_from_camera=[0] * 16)
-    yield 'p.json', [], dict(params, **file_of('env_params', 'p.json', '{"projection": "cube"}'))
+    yield 'p.json', [], dict(params, **file_of('env_params', 'p.json', '{"projection": "square"}'))
     yield 'radius', ['--env-projection', 'angular'], dict(
         params, **file_of('env_params', 'p.json', '{"radius": -3}'))
     yield 'leave one out', ['--env-projection', 'angular', '--world-from-env', '1,0,0,0,1,0,0,0,1'], \

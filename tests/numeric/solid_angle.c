@@ -19,8 +19,12 @@ static struct gn_projection make(enum gn_projection_type type, int side, double 
 {
     struct gn_projection p = {.type = type,
                               .width = type == GN_PROJECTION_LATLONG ? 2 * side : side,
-                              .height = type == GN_PROJECTION_CUBE ? 6 * side : side,
+                              .height = side,
                               .theta_max = theta_max};
+    if (type == GN_PROJECTION_CUBE) {
+        p.width = (side + 1) / 2;
+        p.height = 6 * p.width;
+    }
     if (type == GN_PROJECTION_FISHEYE_KANNALA_BRANDT)
         memcpy(p.k, (double[4]){0.05, -0.02, 0.004, -0.0005}, sizeof(p.k));
     const char *reason = NULL;

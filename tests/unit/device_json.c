@@ -39,6 +39,7 @@ static void test_all_of_it(void **unused)
     assert_int_equal(
         read_setup("{\"projection\":\"fisheye-kannala-brandt\",\"width\":300,\"height\":200,"
                    "\"center\":[151,99],\"radius\":90.5,\"theta_max\":1.5,\"k\":[0.1,0.2,0.3,0.4],"
+                   "\"vignetting\":[-0.3,0.05,-0.01],"
                    "\"pixel_format\":\"log12\",\"response\":{\"type\":\"log\",\"a\":0.5,\"b\":0.1,"
                    "\"c\":0.01},\"to_rec709\":[1,2,0,0,1,0,0,0,1],\"scale\":2.5,"
                    "\"orientation\":[0,1.05,0,0],\"position\":[1,2,3]}",
@@ -48,6 +49,7 @@ static void test_all_of_it(void **unused)
     assert_int_equal(p->type, GN_PROJECTION_FISHEYE_KANNALA_BRANDT);
     assert_true(p->width == 300 && p->height == 200 && p->center[0] == 151 && p->center[1] == 99);
     assert_true(p->radius == 90.5 && p->theta_max == 1.5 && p->k[0] == 0.1 && p->k[3] == 0.4);
+    assert_true(p->vignetting[0] == -0.3 && p->vignetting[1] == 0.05 && p->vignetting[2] == -0.01);
     assert_true(s.is_12_bit);
     assert_int_equal(s.response.type, GN_RESPONSE_LOG);
     assert_true(s.response.log_a == 0.5 && s.response.to_rec709[1] == 2 && s.response.scale == 2.5);
@@ -86,6 +88,10 @@ static void test_refusals(void **unused)
         {"{\"projection\":\"angular\",\"width\":16385}",
          "p.json: width: expected a whole number in [1, 16384], found 16385"},
         {"{\"projection\":\"angular\",\"k\":[1]}", "p.json: k: expected 4 elements, found 1"},
+        {"{\"projection\":\"cube\",\"vignetting\":[-0.1,0,0]}",
+         "p.json: vignetting: only fisheyes, angular maps and mirror balls"},
+        {"{\"projection\":\"angular\",\"vignetting\":[-0.1,0]}",
+         "p.json: vignetting: expected 3 elements, found 2"},
         {"{\"projection\":\"angular\",\"pixel_format\":\"log14\"}",
          "p.json: pixel_format: expected one of 'float32', 'log12', 'linear16', found 'log14'"},
         {"{\"projection\":\"angular\",\"response\":{\"type\":\"log\",\"a\":0,\"b\":0.001,\"c\":0}}",

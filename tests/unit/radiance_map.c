@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <setjmp.h>
@@ -13,6 +14,9 @@
 
 #include <cmocka.h>
 
+#include "common/half.h"
+#include "proto/attr.h"
+#include "server/light/luminance.h"
 #include "server/light/map_table.h"
 #include "server/light/radiance_map.h"
 #include "tests/light_fixture.h"
@@ -128,6 +132,182 @@ static void codes_become_radiance(void **unused)
     gn_radiance_map_unref(&direct);
     gn_radiance_map_unref(&by_table);
     gn_image_finish(&mono);
+    light_fixture_finish(&f);
+}
+
+/* The fixture's picture, [0, 1] in thousandths, in that layout; the caller's. */
+static uint8_t *make_raw(const struct light_fixture *f, enum gn_pixel_layout layout, int code_max)
+{
+    static const int value_bytes[GN_PIXELS_COUNT] = {0, 4, 2, 2, 2, 1};
+    size_t n = (size_t)f->image.width * (size_t)f->image.height,
+           bytes = (size_t)value_bytes[layout];
+    size_t n_values = layout == GN_PIXELS_MONO_U16 ? n : 3 * n;
+    uint8_t *raw = malloc(n_values * bytes);
+    assert_non_null(raw);
+    for (size_t i = 0; i < n_values; i++) {
+        float v = f->image.data[n_values == n ? 3 * i : i];
+        uint16_t half = gn_half_from_float(v);
+        long code = lrintf(v * (float)code_max);
+        uint32_t bits;
+        memcpy(&bits, &v, sizeof(bits));
+        bits = layout == GN_PIXELS_RGB_F32   ? bits
+               : layout == GN_PIXELS_RGB_F16 ? half
+                                             : (uint32_t)code;
+        for (size_t b = 0; b < bytes; b++)
+            raw[i * bytes + b] = (uint8_t)(bits >> 8 * b);
+    }
+    return raw;
+}
+
+static void raw_layouts_are_read_as_images_are(void **unused)
+{
+    (void)unused;
+    static const struct {
+        enum gn_pixel_layout layout;
+        int code_max;
+    } cases[] = {{GN_PIXELS_RGB_F32, 0},      {GN_PIXELS_RGB_F16, 0},    {GN_PIXELS_MONO_U16, 4095},
+                 {GN_PIXELS_MONO_U16, 65535}, {GN_PIXELS_RGB_U16, 1000}, {GN_PIXELS_RGB_U8, 255}};
+    for (size_t k = 0; k < GN_ARRAY_LEN(cases); k++) {
+        struct light_fixture f;
+        make_fixture(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 41, 37);
+        enum gn_pixel_layout layout = cases[k].layout;
+        int code_max = cases[k].code_max;
+        for (int i = 0; i < 3 * 41 * 37; i++) {
+            int texel = layout == GN_PIXELS_MONO_U16 ? i / 3 : i;
+            float v = (float)(texel * 7919 % 1001) / 1000;
+            if (code_max > 0) // what the codes can say
+                v = (float)lrintf(v * (float)code_max) / (float)code_max;
+            if (layout == GN_PIXELS_RGB_F16)
+                v = gn_half_to_float(gn_half_from_float(v));
+            f.image.data[i] = v;
+        }
+        if (code_max == 0) { // what cannot be light
+            f.image.data[3 * (20 * 41 + 20)] = NAN;
+            f.image.data[3 * (20 * 41 + 22) + 1] = -1;
+            f.image.data[3 * (18 * 41 + 20) + 2] = INFINITY;
+        }
+        f.frame.response = (struct gn_response){.type = GN_RESPONSE_GAMMA, .gamma = 2.2};
+        f.frame.code_max = code_max;
+        struct gn_radiance_map *image = make_map(&f, NULL);
+        uint8_t *raw = make_raw(&f, layout, code_max);
+        f.frame.codes = NULL;
+        f.frame.layout = layout;
+        f.frame.raw = raw;
+        struct gn_radiance_map *map = make_map(&f, NULL);
+        for (int i = 0; i < 3 * 41 * 37; i++)
+            if (!(map->radiance.data[i] == image->radiance.data[i]))
+                fail_msg("layout %d, value %d: %.9g, the image's %.9g", layout, i,
+                         (double)map->radiance.data[i], (double)image->radiance.data[i]);
+        assert_memory_equal(&map->figures, &image->figures, sizeof(map->figures));
+        assert_int_equal(map->figures.n_nan + map->figures.n_negative + map->figures.n_inf,
+                         code_max == 0 ? 3 : 0);
+        gn_radiance_map_unref(&map);
+        gn_radiance_map_unref(&image);
+        free(raw);
+        light_fixture_finish(&f);
+    }
+}
+
+/* A code that the format does not have is no light, wherever it stands in the circle. */
+static void a_code_above_the_format_is_refused(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    make_fixture(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 16, 16);
+    uint8_t *raw = make_raw(&f, GN_PIXELS_RGB_U16, 4095);
+    f.frame.codes = NULL;
+    f.frame.layout = GN_PIXELS_RGB_U16;
+    f.frame.raw = raw;
+    f.frame.code_max = 4095;
+    struct gn_radiance_map *map = make_map(&f, NULL);
+    assert_int_equal(map->figures.n_clipped, 16 * 16 - 4 * 12); // centres in the circle
+    gn_radiance_map_unref(&map);
+    raw[6 * (8 * 16 + 15) + 5] = 0x10; // 4096 and more, blue, at the right border
+    struct gn_error error = {0};
+    assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), -EINVAL);
+    assert_null(map);
+    assert_non_null(strstr(error.text, "a code of 4351 in a format of codes 0 to 4095"));
+    free(raw);
+    light_fixture_finish(&f);
+}
+
+/* The sums know which inner texel a rim's texel takes its light from; nothing outside is lit. */
+static void figures_are_sums_over_the_map(void **unused)
+{
+    (void)unused;
+    for (int type = 0; type < GN_PROJECTION_COUNT; type++) {
+        for (int k = 0; k < 3; k++) {
+            struct light_fixture f;
+            make_fixture(&f, (enum gn_projection_type)type, k == 2 ? 3 : 37, k == 2 ? 5 : 29);
+            if (k == 1 && gn_projection_is_radial((enum gn_projection_type)type))
+                f.frame.projection = (struct gn_projection){.type = (enum gn_projection_type)type,
+                                                            .width = 37,
+                                                            .height = 29,
+                                                            .center = {12, 20},
+                                                            .radius = 15};
+            int n = f.image.width * f.image.height;
+            for (int i = 0; i < 3 * n; i++)
+                f.image.data[i] = 1 + (float)(i * 7919 % 1009);
+            struct gn_radiance_map *map = make_map(&f, NULL);
+            double sum[3] = {0}, up = 0, max = 0;
+            for (int i = 0; i < n; i++) {
+                const float *l = map->radiance.data + 3 * i;
+                double w = (double)map->solid_angle[i];
+                assert_int_equal(l[0] == 0, w == 0);
+                max = fmax(max, gn_luminance(l));
+                up += fmax((double)map->direction_world[3 * i + 2], 0) * (double)l[0] * w;
+                for (int c = 0; c < 3; c++)
+                    sum[c] += (double)l[c] * w;
+            }
+            for (int c = 0; c < 3; c++)
+                assert_near(map->figures.shown_irradiance[c], sum[c], 1e-6 * sum[c]);
+            assert_true(map->figures.max_luminance == max);
+            if (map->fill_solid_angle > 0)
+                assert_near(map->fill[0], 0.2 * up / pi, 1e-6 * up);
+            gn_radiance_map_unref(&map);
+            light_fixture_finish(&f);
+        }
+    }
+}
+
+/* A lens that darkens to its rim, before a log sensor: the hemisphere is even again. */
+static void vignetting_is_divided_out(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    make_fixture(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200);
+    double v[3] = {-0.4, 0.1, -0.15};
+    memcpy(f.frame.projection.vignetting, v, sizeof(v));
+    f.frame.response = (struct gn_response){
+        .type = GN_RESPONSE_LOG, .log_a = 0.6, .log_b = 0.08, .log_c = 0.01, .scale = 3};
+    for (int y = 0; y < 200; y++) {
+        for (int x = 0; x < 200; x++) {
+            double s = (pow(x + 0.5 - 100, 2) + pow(y + 0.5 - 100, 2)) / 1e4;
+            for (int c = 0; c < 3; c++)
+                gn_image_at(&f.image, x, y)[c] = (float)(1 + s * (v[0] + s * (v[1] + s * v[2])));
+        }
+    }
+    gn_response_from_radiance(&f.frame.response, f.image.data, 200 * 200);
+    struct gn_radiance_map *map = make_map(&f, NULL);
+    for (size_t i = 0; i < 200 * 200; i++)
+        if (map->solid_angle[i] > 0)
+            assert_near(map->radiance.data[3 * i], 1, 2e-6);
+    assert_near(map->fill[0], 0.2, 1e-4); // E = pi
+    /* The table of another fall-off is another. */
+    f.frame.projection.vignetting[0] = 0;
+    struct gn_radiance_map_options options = {.previous = map};
+    struct gn_radiance_map *other = make_map(&f, &options);
+    assert_true(gn_image_at(&other->radiance, 100, 5)[0] < 0.7f);
+    gn_radiance_map_unref(&other);
+    gn_radiance_map_unref(&map);
+
+    static const double bad[4][3] = {{-1, 0, 0}, {-4, 3.5, 0.6}, {0, 0, -1.0001}, {NAN, 0, 0}};
+    for (int i = 0; i < 4; i++) {
+        const char *reason = NULL;
+        memcpy(f.frame.projection.vignetting, bad[i], sizeof(bad[i]));
+        assert_int_equal(gn_projection_init(&f.frame.projection, &reason), -EINVAL);
+        assert_non_null(strstr(reason, "vignetting"));
+    }
     light_fixture_finish(&f);
 }
 
@@ -306,6 +486,10 @@ int main(void)
         cmocka_unit_test(bad_frames_are_refused),
         cmocka_unit_test(what_is_no_light_is_mended_and_counted),
         cmocka_unit_test(codes_become_radiance),
+        cmocka_unit_test(raw_layouts_are_read_as_images_are),
+        cmocka_unit_test(a_code_above_the_format_is_refused),
+        cmocka_unit_test(figures_are_sums_over_the_map),
+        cmocka_unit_test(vignetting_is_divided_out),
         cmocka_unit_test(every_projection_covers_its_sphere),
         cmocka_unit_test(texel_centres_look_up_themselves),
         cmocka_unit_test(directions_look_up_without_black_or_seam),

@@ -196,9 +196,9 @@ static void test_every_float_must_be_finite(void **state)
             visited += p.visited;
         }
     }
-    // WELCOME 1, ENVIRONMENT_FRAME 31, POSE 8, CAMERA 23, FRAME 4 x 7, RESULT 10, LIGHTING 27,
+    // WELCOME 1, ENVIRONMENT_FRAME 34, POSE 8, CAMERA 23, FRAME 4 x 7, RESULT 10, LIGHTING 27,
     // STATISTICS 3.
-    assert_int_equal(visited, 3 * 131);
+    assert_int_equal(visited, 3 * 134);
 }
 
 /** What one change of a sample must lead to, from the encoder and the decoder alike. */
@@ -237,7 +237,7 @@ static void test_enums_out_of_range(void **state)
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, pixel_format = 0, "pixel_format");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, pixel_format = 9, "pixel_format");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 0, "projection.type");
-    EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 9, "projection.type");
+    EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 11, "projection.type");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, response.type = 5, "response.type");
     EXPECT_REFUSED(CAMERA, camera, response.type = 5, "response.type");
     EXPECT_REFUSED(FRAME, frame, views[3].picture_format = 3, "FRAME.views[3].picture_format");
@@ -266,6 +266,8 @@ static void test_values_out_of_range(void **state)
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, has_projection = false, "projection");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.theta_max = 3.2, "theta_max");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 4, "k1");
+    EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.vignetting_b = 2e6,
+                   "vignetting_b");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.radius_px = -1, "radius_px");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, response.table_entries = 4097, "table");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, response.table_entries = 1, "table");

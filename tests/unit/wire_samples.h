@@ -61,7 +61,7 @@ static inline void sample_environment(struct gn_msg_environment_frame *m)
         .pixel_format = GN_MSG_PIXEL_FORMAT_RGB12,
         .has_projection = true,
         .projection = {GN_MSG_PROJECTION_TYPE_KANNALA_BRANDT, 1.5, 1.25, 1, 2, 1.5, 1e-3, -2e-3,
-                       3e-3, -4e-3},
+                       3e-3, -4e-3, -0.3, 0.05, -0.01},
         .has_response = true,
         .response = {GN_MSG_RESPONSE_TYPE_TABLE, 2.2, 0.1, 0.2, 0.3, 5},
         .matrix_to_rec709 = {1, 2, 3, 4, 5, 6, 7, 8, 9},
