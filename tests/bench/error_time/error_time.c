@@ -1,0 +1,355 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * Error against run time of every way to make lights: on a set of maps and scenes, each method over
+ * its parameter, against the texel-exact picture. One thread; times are processor time of that
+ * thread, medians after a warm-up. Writes into the folder
+ *   error.csv       one line for each scene, map and setting (metrics.h says what the errors are)
+ *   irradiance.csv  harmonics at 200 normals
+ *   stream.csv      flicker, noise and response of each method (sequence.h)
+ *   reference.csv   the references' own error: against parts of twice the size, which is more than
+ *                   what is left as long as halving the parts takes off half of the error or more
+ * and fails where a reference's own error is over a tenth of the smallest error measured with it.
+ * tests/bench/error_time/report.py makes docs/error.md of them; guard.py keeps the quick ones.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+
+#include "tests/bench/error_time/metrics.h"
+#include "tests/bench/error_time/sequence.h"
+#include "tests/bench/error_time/settings.h"
+
+enum { MAX_REPEATS = 21, MAX_MAPS = 16 };
+
+/** How much is done. */
+struct extent {
+    const char *option;
+    enum gn_bench_extent settings;
+    int width, height; // of the pictures, px
+    int map_size;      // of painted fisheyes, px; 0: their own
+    int factor;        // of the reference
+    int repeats;       // of times, [1, MAX_REPEATS]
+    int n_maps;        // of gn_bench_map_names
+};
+
+static const struct extent extents[] = {
+    {"--quick", GN_BENCH_QUICK, 64, 48, 150, 1, 1, 3},
+    {"--default", GN_BENCH_DEFAULT, 128, 96, 0, 2, 5, 7},
+    {"--full", GN_BENCH_DEFAULT, 128, 96, 0, 2, MAX_REPEATS, MAX_MAPS},
+};
+
+struct bench {
+    const struct extent *extent;
+    const char *folder;
+    const char *only_map; // NULL: all
+    struct gn_bench_cache cache;
+    struct gn_bench_scene scenes[GN_BENCH_SCENES];
+    FILE *errors, *irradiance, *stream, *reference;
+    double self_error[GN_BENCH_SCENES], smallest[GN_BENCH_SCENES]; // of the map at hand
+    bool is_bad;                                                   // a reference is not enough
+    struct gn_bench_setting settings[GN_BENCH_SETTINGS_MAX];
+    int n_settings;
+};
+
+/** Median and interquartile range, ms. */
+struct timing {
+    double median, range;
+};
+
+static void check(int result, const char *what, const char *which)
+{
+    if (result >= 0)
+        return;
+    fprintf(stderr, "error_time: %s %s: %s\n", what, which, strerror(-result));
+    exit(1);
+}
+
+static double get_cpu_ms(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static struct timing sum_up(double *ms, int n)
+{
+    qsort(ms, (size_t)n, sizeof(*ms), compare_doubles);
+    return (struct timing){ms[n / 2], ms[3 * n / 4] - ms[n / 4]};
+}
+
+/** The state as a stream has it: its tables are the last state's. */
+static struct gn_lighting_state *make_state(const struct bench *b, const struct gn_bench_map *map,
+                                            const struct gn_light_options *wanted,
+                                            const struct gn_lighting_state *previous,
+                                            struct timing *out_timing)
+{
+    struct gn_lighting_state *state = NULL;
+    double ms[MAX_REPEATS];
+    for (int i = -1; i < b->extent->repeats; i++) {
+        struct gn_light_options options = *wanted;
+        struct gn_lighting_state *next;
+        options.previous = state ? state : previous;
+        double before = get_cpu_ms();
+        check(gn_lighting_state_create(&map->frame, NULL, &options, NULL, &next, NULL),
+              "the light of", map->name);
+        if (i >= 0)
+            ms[i] = get_cpu_ms() - before;
+        gn_lighting_state_unref(&state);
+        state = next;
+    }
+    *out_timing = sum_up(ms, b->extent->repeats);
+    return state;
+}
+
+static struct timing render(const struct bench *b, struct gn_bench_scene *scene,
+                            const struct gn_lighting_state *state, enum gn_quality quality)
+{
+    const struct gn_render_options options = {.quality = quality, .single_ray = true};
+    struct gn_test_stage *stage = &scene->stage;
+    double ms[MAX_REPEATS];
+    for (int i = -1; i < b->extent->repeats; i++) {
+        double before = get_cpu_ms();
+        check(gn_renderer_render(stage->renderer, &stage->camera, state, &options, &stage->layers,
+                                 &stage->report, NULL),
+              "a frame of", scene->name);
+        if (i >= 0)
+            ms[i] = get_cpu_ms() - before;
+    }
+    return sum_up(ms, b->extent->repeats);
+}
+
+static uint64_t count_rays(const struct gn_render_report *r)
+{
+    return r->rays_primary + r->rays_mirror + r->rays_shade + r->rays_shadow;
+}
+
+static void measure_setting(struct bench *b, const struct gn_bench_map *map,
+                            const struct gn_bench_picture references[static GN_BENCH_SCENES],
+                            double exact[static GN_BENCH_NORMALS][3],
+                            const struct gn_lighting_state *previous,
+                            const struct gn_bench_setting *s)
+{
+    struct gn_light_options options = s->light;
+    struct timing light;
+    options.no_sh = true;
+    struct gn_lighting_state *state = make_state(b, map, &options, previous, &light);
+    for (int i = 0; i < GN_BENCH_SCENES; i++) {
+        struct gn_bench_scene *scene = &b->scenes[i];
+        struct gn_bench_errors e;
+        struct timing frame = render(b, scene, state, s->quality);
+        check(gn_bench_measure_errors(&references[i], &scene->stage.layers, true, &e),
+              "the errors of", scene->name);
+        b->smallest[i] = fmin(b->smallest[i], e.rmse);
+        fprintf(b->errors,
+                "%s,%s,%s,%s,%d,%d,%.4f,%.4f,%.4f,%.4f,%llu,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%ld\n",
+                scene->name, map->name, s->method, s->params, s->asked, state->n_lights,
+                light.median, light.range, frame.median, frame.range,
+                (unsigned long long)count_rays(&scene->stage.report), e.rmse, e.bias, e.relmse,
+                e.relmse_trimmed, gn_bench_compare_irradiance(state, exact), e.flip, e.n_masked);
+    }
+    gn_lighting_state_unref(&state);
+}
+
+/** Harmonics need no scene: diffuse surfaces take E(n) of them. */
+static void measure_harmonics(struct bench *b, const struct gn_bench_map *map,
+                              double exact[static GN_BENCH_NORMALS][3],
+                              const struct gn_lighting_state *previous)
+{
+    static const struct {
+        const char *name;
+        struct gn_irradiance_options options;
+    } kinds[] = {{"order 2 of all light (the paper)", {.order = 2, .keep_lights = true}},
+                 {"order 2", {.order = 2}},
+                 {"order 4", {.order = 4}},
+                 {"order 2 without ringing", {.order = 2, .dering = true}},
+                 {"order 4 without ringing", {.order = 4, .dering = true}}};
+    for (size_t i = 0; i < GN_ARRAY_LEN(kinds); i++) {
+        const struct gn_light_options options = {.no_lights = true, .irradiance = kinds[i].options};
+        struct timing timing;
+        struct gn_lighting_state *state = make_state(b, map, &options, previous, &timing);
+        fprintf(b->irradiance, "%s,%s,%.4f,%.6g\n", map->name, kinds[i].name, timing.median,
+                gn_bench_compare_sh(state, exact));
+        gn_lighting_state_unref(&state);
+    }
+}
+
+/** The pictures to compare with, and how far they are from those of larger parts. */
+static void make_references(struct bench *b, const struct gn_bench_map *map,
+                            struct gn_bench_picture out[static GN_BENCH_SCENES])
+{
+    for (int i = 0; i < GN_BENCH_SCENES; i++) {
+        struct gn_bench_scene *scene = &b->scenes[i];
+        struct gn_bench_picture coarse;
+        struct gn_bench_errors self;
+        check(gn_bench_make_reference(&b->cache, scene, map, b->extent->factor, &out[i]),
+              "the reference of", map->name);
+        b->self_error[i] = 0;
+        b->smallest[i] = INFINITY;
+        if (b->extent->factor == 1)
+            continue; // quick: only whether errors change is looked at
+        check(gn_bench_make_reference(&b->cache, scene, map, b->extent->factor / 2, &coarse),
+              "the coarser reference of", map->name);
+        const struct gn_layers layers = {.width = coarse.shadow.width,
+                                         .height = coarse.shadow.height,
+                                         .virtual_rgba = coarse.virtual_rgba,
+                                         .shadow = coarse.shadow};
+        check(gn_bench_measure_errors(&out[i], &layers, false, &self), "the self-error of",
+              map->name);
+        b->self_error[i] = self.rmse;
+        gn_bench_picture_finish(&coarse);
+    }
+}
+
+static void check_references(struct bench *b, const struct gn_bench_map *map)
+{
+    for (int i = 0; i < GN_BENCH_SCENES; i++) {
+        bool is_good = b->self_error[i] <= 0.1 * b->smallest[i];
+        fprintf(b->reference, "%s,%s,%.4g,%.4g\n", b->scenes[i].name, map->name, b->self_error[i],
+                b->smallest[i]);
+        printf("%-22s %-8s reference within %.2g, smallest error %.2g%s\n", map->name,
+               b->scenes[i].name, b->self_error[i], b->smallest[i], is_good ? "" : ": NOT A TENTH");
+        b->is_bad = b->is_bad || !is_good;
+    }
+}
+
+static void measure_map(struct bench *b, const char *name)
+{
+    static double exact[GN_BENCH_NORMALS][3];
+    const struct gn_light_options first = {.no_sh = true};
+    struct gn_bench_picture references[GN_BENCH_SCENES];
+    struct gn_lighting_state *state = NULL;
+    struct gn_bench_map map;
+    struct timing unused;
+    int ret = gn_bench_map_init(name, b->extent->map_size, &map);
+    if (ret == -ENOENT) {
+        printf("%-22s not here: left out\n", name);
+        return;
+    }
+    check(ret, "the map", name);
+    make_references(b, &map, references);
+    state = make_state(b, &map, &first, NULL, &unused);
+    gn_bench_sum_texels(state->map, exact);
+    for (int i = 0; i < b->n_settings; i++)
+        measure_setting(b, &map, references, exact, state, &b->settings[i]);
+    measure_harmonics(b, &map, exact, state);
+    check_references(b, &map);
+    fflush(NULL);
+    gn_lighting_state_unref(&state);
+    for (int i = 0; i < GN_BENCH_SCENES; i++)
+        gn_bench_picture_finish(&references[i]);
+    gn_bench_map_finish(&map);
+}
+
+static void measure_streams(struct bench *b)
+{
+    static struct gn_bench_setting settings[GN_BENCH_SETTINGS_MAX];
+    static const double smoothings[] = {0, 0.1};
+    static struct gn_bench_streams streams;
+    struct gn_bench_scene scene;
+    int n = gn_bench_list_settings(GN_BENCH_STREAM, settings);
+    gn_bench_scene_init(&scene, 0, 64, 48);
+    check(gn_bench_streams_init(&streams, &b->cache, &scene), "the references of", "streams");
+    for (int i = 0; i < n; i++) {
+        for (size_t k = 0; k < GN_ARRAY_LEN(smoothings); k++) {
+            struct gn_bench_steadiness s;
+            check(gn_bench_measure_steadiness(&streams, &settings[i], smoothings[k], &s),
+                  "the stream of", settings[i].method);
+            fprintf(b->stream, "%s,%s,%d,%g,%.6g,%.6g,%d\n", settings[i].method, settings[i].params,
+                    s.n_lights, smoothings[k], s.flicker, s.noise_codes, s.response_frames);
+        }
+    }
+    gn_bench_streams_finish(&streams);
+    gn_bench_scene_finish(&scene);
+}
+
+static FILE *open_table(const struct bench *b, const char *name, const char *head)
+{
+    char path[4096];
+    FILE *file = NULL;
+    if (snprintf(path, sizeof(path), "%s/%s", b->folder, name) < (int)sizeof(path))
+        file = fopen(path, "w");
+    check(file ? 0 : -errno, "cannot write", path);
+    fprintf(file, "%s\n", head);
+    return file;
+}
+
+static void run(struct bench *b)
+{
+    b->errors = open_table(b, "error.csv",
+                           "scene,map,method,params,asked,lights,ms_light,iqr_light,ms_frame,"
+                           "iqr_frame,rays,rmse,bias,relmse,relmse_trimmed,irradiance,flip,masked");
+    b->irradiance = open_table(b, "irradiance.csv", "map,harmonics,ms,irradiance");
+    b->stream = open_table(b, "stream.csv",
+                           "method,params,lights,smoothing,flicker,noise_codes,response_frames");
+    b->reference = open_table(b, "reference.csv", "scene,map,self_error,smallest");
+    for (int i = 0; i < GN_BENCH_SCENES; i++)
+        gn_bench_scene_init(&b->scenes[i], i, b->extent->width, b->extent->height);
+    b->n_settings = gn_bench_list_settings(b->extent->settings, b->settings);
+    for (int i = 0; i < gn_bench_n_maps && i < b->extent->n_maps; i++) {
+        if (!b->only_map || strcmp(b->only_map, gn_bench_map_names[i]) == 0)
+            measure_map(b, gn_bench_map_names[i]);
+    }
+    if (!b->only_map)
+        measure_streams(b);
+    FILE *files[] = {b->errors, b->irradiance, b->stream, b->reference};
+    for (size_t i = 0; i < GN_ARRAY_LEN(files); i++)
+        check(fclose(files[i]) == 0 ? 0 : -errno, "cannot write into", b->folder);
+    for (int i = 0; i < GN_BENCH_SCENES; i++)
+        gn_bench_scene_finish(&b->scenes[i]);
+    printf("%d settings; references: %d made in %.1f s, %d read\n", b->n_settings, b->cache.n_made,
+           b->cache.seconds, b->cache.n_read);
+}
+
+static int refuse(const char *name)
+{
+    fprintf(stderr,
+            "usage: %s [--quick | --default | --full] [--map NAME] [--cache FOLDER] FOLDER\n"
+            "Writes CSV tables into FOLDER. --quick: seconds, for the guard; --full: more repeats\n"
+            "and maps, for the page. GN_TEST_MAPS and GNOMON_DATA name folders of photographs.\n",
+            name);
+    return 2;
+}
+
+int main(int argc, char **argv)
+{
+    static struct bench b = {.extent = &extents[1]};
+    for (int i = 1; i < argc; i++) {
+        bool is_extent = false;
+        for (size_t k = 0; k < GN_ARRAY_LEN(extents); k++) {
+            if (strcmp(argv[i], extents[k].option) == 0) {
+                b.extent = &extents[k];
+                is_extent = true;
+            }
+        }
+        if (is_extent)
+            continue;
+        if (strcmp(argv[i], "--cache") == 0 && i + 1 < argc)
+            b.cache.folder = argv[++i];
+        else if (strcmp(argv[i], "--map") == 0 && i + 1 < argc)
+            b.only_map = argv[++i];
+        else if (argv[i][0] == '-' || b.folder)
+            return refuse(argv[0]);
+        else
+            b.folder = argv[i];
+    }
+    if (!b.folder)
+        return refuse(argv[0]);
+    const char *folders[] = {b.folder, b.cache.folder};
+    for (int i = 0; i < 2; i++) {
+        if (folders[i] && mkdir(folders[i], 0777) != 0 && errno != EEXIST)
+            check(-errno, "cannot make", folders[i]);
+    }
+    run(&b);
+    return b.is_bad ? 1 : 0;
+}
