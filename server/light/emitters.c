@@ -125,7 +125,7 @@ static int get_sent(const struct gn_emitters *e, uint32_t object_index, int firs
         }
         return 0;
     }
-    struct gn_picture_triangle *laid = malloc(((size_t)n + 1) * sizeof(*laid));
+    struct gn_picture_triangle *laid = calloc((size_t)n + 1, sizeof(*laid));
     struct gn_picture_mean *means = malloc(((size_t)n + 1) * sizeof(*means));
     int ret = laid && means ? 0 : -ENOMEM;
     for (int i = 0; i < n && ret == 0; i++)

@@ -343,6 +343,8 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
         gn_lighting_state_unref(&s->others[i]);
     gn_partition_plan_unref(&s->plan);
     gn_radiance_map_unref(&s->map);
+    gn_emission_unref(&s->emission);
+    free(s->near);
     free(s->lights);
     free(s);
 }

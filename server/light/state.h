@@ -157,7 +157,8 @@ struct gn_lighting_state {
     int n_lights;
     struct gn_light *lights; // [n_lights], owned; by falling luminance
     int n_near;
-    struct gn_near_light *near;   // [n_near], owned; those of `emission` that give light
+    struct gn_near_light *near;   // [n_near], owned; those of `emission` that give light, by its
+                                  // order
     struct gn_emission *emission; // pictures on emitters; shared (ref), may be NULL: no near light
     double total_irradiance[3];   // sum over the sphere, fill included, of L dOmega, W/m^2: what
                                   // the lights add up to (seed: they do not); smoothed
@@ -184,6 +185,7 @@ GN_MUST_USE int gn_lighting_state_create(const struct gn_environment_frame *fram
                                          struct gn_pool *pool, struct gn_lighting_state **out_state,
                                          struct gn_error *out_error);
 /**
+<<<<<<< HEAD
  * The same light at a later time, for a frame that equals the one it was made from: map, tables and
  * the lights before smoothing are shared; smoothing goes on. Returns 0 or -ENOMEM.
  */
@@ -203,12 +205,22 @@ GN_MUST_USE int gn_lighting_state_complete(const struct gn_lighting_state *state
 /**
  * A state of near light only, for a room without a probe: its map is black, sequence 0. options as
  * above, with their emission. Returns 0 or a negative errno and a sentence.
+=======
+ * A state of near light only, for a room without a probe: its map is black, its sequence 0. Returns
+ * 0 or a negative errno and a sentence.
+>>>>>>> d11e8a0 (light: lamps and emissive meshes as near lights)
  */
-GN_MUST_USE int gn_lighting_state_create_dark(const struct gn_light_options *options,
+GN_MUST_USE int gn_lighting_state_create_dark(struct gn_emission *emission,
+                                              const struct gn_light_options *options,
                                               int64_t capture_time_ns,
                                               struct gn_lighting_state **out_state,
                                               struct gn_error *out_error);
-/** The same state with other near light (may be NULL); shares the map. 0 or -ENOMEM. */
+/** Gives a state that nobody else has yet its near light; emission may be NULL: none. The state
+ * takes a reference of its own. 0 or -ENOMEM: then the state is as before. */
+GN_MUST_USE int gn_lighting_state_set_emission(struct gn_lighting_state *state,
+                                               struct gn_emission *emission);
+/** A copy of a published state with other near light. It shares the map and the other probes'
+ * states; it is no `previous` for the next one. 0 or -ENOMEM. */
 GN_MUST_USE int gn_lighting_state_replace_emission(const struct gn_lighting_state *state,
                                                    struct gn_emission *emission,
                                                    struct gn_lighting_state **out_state);
