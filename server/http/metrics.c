@@ -120,6 +120,29 @@ static void put_transport(FILE *out, const struct gn_http_view *view)
     }
 }
 
+static void put_probes(FILE *out, const struct gn_http_view *view, const struct sample *samples)
+{
+    static const struct {
+        const char *name, *type, *help;
+    } heads[] = {
+        {"gnomon_probe_age_seconds", "gauge",
+         "Now minus the capture time of the probe's light, by session."},
+        {"gnomon_probe_states_total", "counter", "Frames of the probe that gave light."},
+    };
+    for (size_t m = 0; m < GN_ARRAY_LEN(heads); m++) {
+        put_head(out, heads[m].name, heads[m].type, heads[m].help);
+        for (int i = 0; i < view->options.n_rooms; i++) {
+            struct gn_probe_figures probes[GN_PROBES_MAX];
+            int n = gn_room_get_probes(view->options.rooms[i], probes);
+            for (int p = 0; p < n; p++)
+                fprintf(out, "%s{%s,session=\"%llu\"} %.9g\n", heads[m].name, samples[i].label,
+                        (unsigned long long)probes[p].session_id,
+                        m == 0 ? (double)(gn_clock_get_monotonic_ns() - probes[p].capture_ns) * 1e-9
+                               : (double)probes[p].n_lit);
+        }
+    }
+}
+
 static void put_rooms(FILE *out, const struct sample *samples, int n)
 {
     for (size_t m = 0; m < GN_ARRAY_LEN(metrics); m++) {
@@ -164,6 +187,7 @@ int gn_http_make_metrics(const struct gn_http_view *view, struct gn_document *ou
             (double)(gn_clock_get_monotonic_ns() - view->start_ns) * 1e-9);
     put_transport(file, view);
     put_rooms(file, samples, n);
+    put_probes(file, view, samples);
     free(samples);
     bool is_short = ferror(file) != 0;
     if (fclose(file) != 0 || is_short) {

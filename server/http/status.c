@@ -57,6 +57,25 @@ static json_t *make_sessions(struct gn_room *room, bool *is_short)
     return list;
 }
 
+static json_t *make_probes(struct gn_room *room, bool *is_short)
+{
+    struct gn_probe_figures probes[GN_PROBES_MAX];
+    json_t *list = json_array();
+    int n = gn_room_get_probes(room, probes);
+    for (int i = 0; i < n; i++) {
+        const struct gn_probe_figures *p = &probes[i];
+        append(list,
+               json_pack("{s:I, s:b, s:[f, f, f], s:i, s:I, s:I, s:f, s:f}", //
+                         "session", (json_int_t)p->session_id, "has_left", p->has_left,
+                         "position_m", p->position[0], p->position[1], p->position[2], //
+                         "lights", p->n_lights, "sequence", (json_int_t)p->sequence, "published",
+                         (json_int_t)p->n_lit, "rate_hz", p->rate_hz, "age_ms",
+                         get_ms_since(p->capture_ns)),
+               is_short);
+    }
+    return list;
+}
+
 static json_t *make_light(const struct gn_room_figures *f)
 {
     if (!f->has_light)
@@ -123,7 +142,7 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
     // clang-format off
     json_t *json = json_pack(
         "{s:s, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I, s:I, s:o, s:I, s:I, s:I,"
-        " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o}",
+        " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o, s:o}",
         "name", gn_room_get_options(room)->name,
         "scene", "objects", f->n_objects, "real_triangles", f->n_real_triangles,
             "virtual_triangles", f->n_virtual_triangles,
@@ -136,7 +155,7 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
         "latency_ms", "p50", f->latency_p50_ms, "p90", f->latency_p90_ms, "p99", f->latency_p99_ms,
         "busy_p50_ms", f->busy_p50_ms,
         "holdable_fps_640x480", "room", f->holdable_fps_room, "viewer", f->holdable_fps_viewer,
-        "light", make_light(f), "last_receipt", make_receipt(f, is_short),
+        "light", make_light(f), "lit_by", make_probes(room, is_short), "last_receipt", make_receipt(f, is_short),
         "sessions", make_sessions(room, is_short));
     // clang-format on
     free(f);

@@ -19,13 +19,21 @@ static void drop_oldest_result(struct gn_outbox *outbox)
     }
 }
 
-/** Puts the note in the place of a waiting one of its type. False: there is none. */
-static bool replace_same_type(struct gn_outbox *outbox, struct gn_mailbox *mailbox,
-                              struct gn_note *note)
+/** Does the note say anew what the old one says? A lighting state only of the same probe. */
+static bool is_newer(const struct gn_note *note, const struct gn_note *old)
+{
+    return note->type == old->type &&
+           (note->type != GN_WIRE_LIGHTING_STATE ||
+            note->body.lighting_state.probe == old->body.lighting_state.probe);
+}
+
+/** Puts the note in the place of a waiting one of its kind. False: there is none. */
+static bool replace_older(struct gn_outbox *outbox, struct gn_mailbox *mailbox,
+                          struct gn_note *note)
 {
     struct gn_note *before = NULL;
     for (struct gn_note *n = outbox->first; n; before = n, n = n->next) {
-        if (n->type != note->type)
+        if (!is_newer(note, n))
             continue;
         note->next = n->next;
         if (before)
@@ -43,7 +51,7 @@ static bool replace_same_type(struct gn_outbox *outbox, struct gn_mailbox *mailb
 int gn_outbox_put(struct gn_outbox *outbox, struct gn_mailbox *mailbox, struct gn_note *note)
 {
     if ((note->type == GN_WIRE_LIGHTING_STATE || note->type == GN_WIRE_STATISTICS) &&
-        replace_same_type(outbox, mailbox, note))
+        replace_older(outbox, mailbox, note))
         return 0;
     if (outbox->n_messages >= GN_OUTBOX_MAX_MESSAGES)
         return -ENOBUFS;

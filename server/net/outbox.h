@@ -2,7 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * What waits to be sent to one peer, bounded. A peer that reads slowly loses its oldest results,
- * each answered by the DROPPED that takes its place; states and statistics keep only the newest.
+ * each answered by the DROPPED that takes its place; of each probe's lighting states and of
+ * statistics only the newest waits.
  */
 #ifndef GN_SERVER_NET_OUTBOX_H
 #define GN_SERVER_NET_OUTBOX_H

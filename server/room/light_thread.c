@@ -212,6 +212,7 @@ static void make_light(struct gn_room *room, struct gn_environment_decoder *deco
     double ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
     struct gn_light_options options = room->options.light;
     options.previous = previous;
+    options.stream = job->session_id;
     if (rc == 0)
         rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
                                       &state, &error);

@@ -54,7 +54,7 @@ static void put_lights(const struct gn_lighting_state *state, uint8_t *at)
             put_float(at + 16 + 4 * c, light->irradiance[c]);
         }
         put_float(at + 12, light->angular_radius);
-        put_float(at + 28, 0);
+        put_float(at + 28, light->distance < INFINITY ? light->distance : 0);
     }
 }
 
@@ -73,7 +73,10 @@ int gn_lighting_message_make(const struct gn_lighting_state *state, bool with_ma
         .sequence = state->sequence,
         .capture_time_ns = state->capture_time_ns,
         .light_count = (uint32_t)state->n_lights,
+        .probe = state->stream,
     };
+    for (int i = 0; i < 3; i++)
+        body.probe_position_m[i] = (float)state->map->world_from_probe.translation[i];
     for (int i = 0; state->has_sh && i < 27; i++)
         body.sh[i] = (float)state->sh[i / 3][i % 3];
     if (with_map) {

@@ -50,7 +50,8 @@ FIXED = {
     'LightingState.light_count': (3, 5), 'LightingState.map_width': (4, 6),
     'LightingState.map_height': (2, 3),
 }
-COUNTS = {'orientation': 4, 'position_m': 3, 'matrix_to_rec709': 9, 'sh': 27}
+COUNTS = {'orientation': 4, 'position_m': 3, 'matrix_to_rec709': 9, 'sh': 27,
+          'probe_position_m': 3}
 STRING_BYTES = {  # without the NUL of C
     'Hello.client_name': 63, 'Hello.client_version': 31, 'Hello.token': 255, 'Hello.room': 63,
     'Welcome.server_name': 63, 'Welcome.server_version': 31, 'Welcome.room': 63, 'Redirect.host': 255,

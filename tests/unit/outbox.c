@@ -84,7 +84,11 @@ static void test_newest_state(void **state)
     assert_int_equal(gn_outbox_put(&outbox, mailbox, make_note(GN_WIRE_PONG, 2)), 0);
     assert_int_equal(gn_outbox_put(&outbox, mailbox, make_note(GN_WIRE_LIGHTING_STATE, 10)), 0);
     assert_int_equal(outbox.n_messages, 3);
-    struct gn_note *note = gn_outbox_take(&outbox);
+    struct gn_note *note = make_note(GN_WIRE_LIGHTING_STATE, 11);
+    note->body.lighting_state.probe = 5; // another probe's stands beside it
+    assert_int_equal(gn_outbox_put(&outbox, mailbox, note), 0);
+    assert_int_equal(outbox.n_messages, 4);
+    note = gn_outbox_take(&outbox);
     assert_int_equal(note->body.pong.t1_ns, 1);
     gn_mailbox_recycle(mailbox, &note);
     note = gn_outbox_take(&outbox);
