@@ -102,17 +102,15 @@ static bool is_member(const struct search *s, uint32_t texel)
 static void get_background(const struct search *s, float out_background[static 3])
 {
     const struct gn_radiance_map *map = s->map;
-    int width = map->radiance.width, height = map->radiance.height;
+    int width = map->radiance.width;
     double sum[3] = {0}, weight = 0;
     for (int i = 0; i < s->n_members; i++) {
         int x = (int)(s->sorted[i] % (uint32_t)width), y = (int)(s->sorted[i] / (uint32_t)width);
         for (int k = 0; k < 9; k++) {
-            int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
-            if (map->projection.type == GN_PROJECTION_LATLONG)
-                nx = (nx + width) % width;
-            if (nx < 0 || nx >= width || ny < 0 || ny >= height)
+            int at[2] = {x, y};
+            if (!gn_projection_step(&map->projection, k % 3 - 1, k / 3 - 1, at))
                 continue;
-            uint32_t texel = (uint32_t)ny * (uint32_t)width + (uint32_t)nx;
+            uint32_t texel = (uint32_t)at[1] * (uint32_t)width + (uint32_t)at[0];
             double w = (double)map->solid_angle[texel];
             if (!(w > 0) || is_member(s, texel))
                 continue;
@@ -185,20 +183,12 @@ static int keep_spot(const struct search *s, struct gn_compact_light *light,
 {
     size_t n = (size_t)out->n_texels + (size_t)light->n;
     uint32_t *texel = realloc(out->texel, n * sizeof(*texel));
-    if (texel)
-        out->texel = texel;
-    float *radiance = realloc(out->radiance, n * 3 * sizeof(*radiance));
-    if (radiance)
-        out->radiance = radiance;
-    if (!texel || !radiance)
+    if (!texel)
         return -ENOMEM;
+    out->texel = texel;
     light->first = out->n_texels;
-    for (int i = 0; i < light->n; i++) {
-        size_t slot = (size_t)out->n_texels++;
-        texel[slot] = s->sorted[i];
-        memcpy(radiance + 3 * slot, s->map->radiance.data + 3 * (size_t)s->sorted[i],
-               3 * sizeof(*radiance));
-    }
+    memcpy(texel + light->first, s->sorted, (size_t)light->n * sizeof(*texel));
+    out->n_texels += light->n;
     int place = out->n++;
     for (; place > 0 && out->light[place - 1].energy < light->energy; place--)
         out->light[place] = out->light[place - 1];
@@ -247,49 +237,74 @@ int gn_compact_find(const struct gn_radiance_map *map, const struct gn_compact_o
 void gn_compact_finish(struct gn_compact_lights *lights)
 {
     free(lights->texel);
-    free(lights->radiance);
     memset(lights, 0, sizeof(*lights));
 }
 
-void gn_compact_take_out(const struct gn_compact_lights *lights, struct gn_radiance_map *map,
-                         struct gn_radiance_map_figures *out_keep)
+/* Sums over one row of what is left. */
+struct row_sums {
+    double irradiance[3], max_luminance;
+};
+
+struct resum {
+    struct gn_radiance_map *map;
+    struct row_sums *rows; // [height]
+};
+
+static void sum_row(void *context, int y, int worker)
 {
-    *out_keep = map->figures;
-    if (lights->n == 0)
-        return;
+    (void)worker;
+    const struct resum *r = context;
+    size_t width = (size_t)r->map->radiance.width, start = (size_t)y * width;
+    struct row_sums sums = {{0}, 0};
+    for (size_t i = start; i < start + width; i++) {
+        const float *l = r->map->radiance.data + 3 * i;
+        double w = (double)r->map->solid_angle[i], luminance = gn_luminance(l);
+        sums.max_luminance = luminance > sums.max_luminance ? luminance : sums.max_luminance;
+        for (int c = 0; c < 3; c++)
+            sums.irradiance[c] += (double)l[c] * w;
+    }
+    r->rows[y] = sums;
+}
+
+/* Summed anew: a difference would leave the rounding of a sun in the sum of the rest. */
+static int sum_anew(struct gn_radiance_map *map, struct gn_pool *pool)
+{
     struct gn_radiance_map_figures *f = &map->figures;
+    struct resum r = {map, malloc((size_t)map->radiance.height * sizeof(*r.rows))};
+    if (!r.rows)
+        return -ENOMEM;
+    gn_pool_run(pool, map->radiance.height, sum_row, &r);
+    double sum[3] = {0}, max = 0;
+    for (int y = 0; y < map->radiance.height; y++) {
+        max = fmax(max, r.rows[y].max_luminance);
+        for (int c = 0; c < 3; c++)
+            sum[c] += r.rows[y].irradiance[c];
+    }
+    f->max_luminance = max;
+    f->mean_luminance =
+        (0.2126 * sum[0] + 0.7152 * sum[1] + 0.0722 * sum[2]) / f->shown_solid_angle;
+    memcpy(f->shown_irradiance, sum, sizeof(sum));
+    free(r.rows);
+    return 0;
+}
+
+int gn_compact_get_rest(const struct gn_compact_lights *lights, const struct gn_radiance_map *map,
+                        struct gn_pool *pool, struct gn_radiance_map **out_rest)
+{
+    struct gn_radiance_map *rest;
+    *out_rest = NULL;
+    int rc = gn_radiance_map_copy(map, &rest);
+    if (rc < 0)
+        return rc;
     for (int i = 0; i < lights->n; i++) {
         const struct gn_compact_light *light = &lights->light[i];
         for (int k = light->first; k < light->first + light->n; k++)
-            memcpy(map->radiance.data + 3 * (size_t)lights->texel[k], light->background,
+            memcpy(rest->radiance.data + 3 * (size_t)lights->texel[k], light->background,
                    sizeof(light->background));
     }
-    // Summed anew: a difference would leave the rounding of a sun in the sum of the rest.
-    size_t width = (size_t)map->radiance.width, n = width * (size_t)map->radiance.height;
-    double irradiance[3] = {0}, max = 0;
-    for (size_t start = 0; start < n; start += width) {
-        double row[3] = {0};
-        for (size_t i = start; i < start + width; i++) {
-            const float *l = map->radiance.data + 3 * i;
-            double w = (double)map->solid_angle[i];
-            max = fmax(max, gn_luminance(l));
-            for (int c = 0; c < 3; c++)
-                row[c] += (double)l[c] * w;
-        }
-        for (int c = 0; c < 3; c++)
-            irradiance[c] += row[c];
-    }
-    double energy = 0.2126 * irradiance[0] + 0.7152 * irradiance[1] + 0.0722 * irradiance[2];
-    f->max_luminance = max;
-    f->mean_luminance = energy / f->shown_solid_angle;
-    memcpy(f->shown_irradiance, irradiance, sizeof(irradiance));
-}
-
-void gn_compact_put_back(const struct gn_compact_lights *lights, struct gn_radiance_map *map,
-                         const struct gn_radiance_map_figures *keep)
-{
-    map->figures = *keep;
-    for (int k = 0; k < lights->n_texels; k++)
-        memcpy(map->radiance.data + 3 * (size_t)lights->texel[k], lights->radiance + 3 * k,
-               3 * sizeof(float));
+    rc = sum_anew(rest, pool);
+    if (rc < 0)
+        gn_radiance_map_unref(&rest);
+    *out_rest = rest;
+    return rc;
 }

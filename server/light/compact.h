@@ -39,7 +39,6 @@ struct gn_compact_lights {
     struct gn_compact_light light[GN_COMPACT_MAX];
     int n_texels;
     uint32_t *texel; // [n_texels] index into the map, by spot, owned
-    float *radiance; // [n_texels][3] of the map, owned
 };
 
 /**
@@ -54,13 +53,11 @@ GN_MUST_USE int gn_compact_find(const struct gn_radiance_map *map,
 void gn_compact_finish(struct gn_compact_lights *lights);
 
 /**
- * Leaves the background in the spots' texels, in pixels and figures: the map is then what the spots
- * leave, and both add up to the map per channel. For a map that nobody else sees yet. put_back
- * restores every bit; keep is the map's figures before.
+ * What the spots leave: a map like the other but for the spots' texels, which have the background,
+ * and for the figures' sums; both add up to the map per channel. Returns 0 or -ENOMEM.
  */
-void gn_compact_take_out(const struct gn_compact_lights *lights, struct gn_radiance_map *map,
-                         struct gn_radiance_map_figures *out_keep);
-void gn_compact_put_back(const struct gn_compact_lights *lights, struct gn_radiance_map *map,
-                         const struct gn_radiance_map_figures *keep);
+GN_MUST_USE int gn_compact_get_rest(const struct gn_compact_lights *lights,
+                                    const struct gn_radiance_map *map, struct gn_pool *pool,
+                                    struct gn_radiance_map **out_rest);
 
 #endif

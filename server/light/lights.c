@@ -205,6 +205,7 @@ int gn_light_settings_init(struct gn_light_settings *settings,
     s.weights = o->weights;
     s.relaxed = o->relaxed;
     s.literal = ((is_seed ? GN_READ_SEED : 0) | o->literal) & ~o->mended;
+    s.has_discs = !is_seed && !o->no_discs;
     if (s.metric == GN_METRIC_DEFAULT)
         s.metric = is_seed ? GN_METRIC_POW2 : GN_METRIC_LOG2;
     s.n_aim = o->n_lights > 0 ? o->n_lights : 64;

@@ -75,6 +75,7 @@ struct gn_light_settings {
     int n_aim; // 0: none
     enum gn_light_weights weights;
     bool relaxed;
+    bool has_discs;
 };
 
 /**

@@ -153,7 +153,7 @@ static const struct gn_light_memory *recall(const struct gn_light_input *input,
 {
     const struct gn_light_memory *last = input->previous ? input->previous->memory : NULL;
     if (!last || !last->marks || last->figure[SIDE] != grid->side ||
-        memcmp(&last->settings, input->settings, sizeof(last->settings)) != 0)
+        memcmp(&last->settings, &input->memory->settings, sizeof(last->settings)) != 0)
         return NULL;
     return last;
 }

@@ -258,6 +258,31 @@ int gn_radiance_map_create(const struct gn_environment_frame *frame,
     return rc;
 }
 
+int gn_radiance_map_copy(const struct gn_radiance_map *map, struct gn_radiance_map **out_map)
+{
+    struct gn_radiance_map *copy;
+    *out_map = NULL;
+    int rc = get_blank(&map->projection, &map->world_from_probe, map, NULL, &copy);
+    if (rc < 0)
+        return rc;
+    copy->geometry = map->geometry ? gn_map_geometry_ref(map->geometry) : NULL;
+    copy->codes = NULL;
+    copy->projection = map->projection;
+    copy->world_from_probe = map->world_from_probe;
+    copy->solid_angle = map->solid_angle;
+    copy->direction_world = map->direction_world;
+    copy->is_full_sphere = map->is_full_sphere;
+    memcpy(copy->fill, map->fill, sizeof(copy->fill));
+    copy->fill_solid_angle = map->fill_solid_angle;
+    copy->capture_time_ns = map->capture_time_ns;
+    copy->sequence = map->sequence;
+    copy->figures = map->figures;
+    memcpy(copy->radiance.data, map->radiance.data,
+           3 * (size_t)map->radiance.width * (size_t)map->radiance.height * sizeof(float));
+    *out_map = copy;
+    return 0;
+}
+
 struct gn_radiance_map *gn_radiance_map_ref(struct gn_radiance_map *map)
 {
     atomic_fetch_add_explicit(&map->references, 1, memory_order_relaxed);

@@ -110,6 +110,9 @@ GN_MUST_USE int gn_radiance_map_create(const struct gn_environment_frame *frame,
                                        const struct gn_radiance_map_options *options,
                                        struct gn_pool *pool, struct gn_radiance_map **out_map,
                                        struct gn_error *out_error);
+/** A map with pixels of its own, which the caller may change; shares the rest. 0 or -ENOMEM. */
+GN_MUST_USE int gn_radiance_map_copy(const struct gn_radiance_map *map,
+                                     struct gn_radiance_map **out_map);
 struct gn_radiance_map *gn_radiance_map_ref(struct gn_radiance_map *map);
 /** NULL-safe; nulls *map. */
 void gn_radiance_map_unref(struct gn_radiance_map **map);

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/light/discs.h"
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
 #include "server/light/method.h"
@@ -81,6 +82,31 @@ static void place_lights(struct gn_lighting_state *state)
     }
 }
 
+/* Lights of the map, small suns first, the rest by the method. */
+static int make_from_rest(struct gn_lighting_state *state, struct gn_light_settings *settings,
+                          const struct gn_lighting_state *previous, struct gn_pool *pool,
+                          struct gn_light_list *list)
+{
+    struct gn_radiance_map *rest = NULL;
+    int rc = 0;
+    if (settings->has_discs)
+        rc = gn_discs_take(state->map, previous, pool, list, &rest);
+    state->figures.n_discs = list->n;
+    if (settings->n_aim > 0)
+        settings->n_aim = settings->n_aim > list->n ? settings->n_aim - list->n : 1;
+    const struct gn_light_input input = {.map = rest ? rest : state->map,
+                                         .settings = settings,
+                                         .plan = state->plan,
+                                         .previous = previous,
+                                         .remembered = recall(state, previous),
+                                         .memory = state->memory,
+                                         .pool = pool};
+    if (rc == 0)
+        rc = gn_light_maker_get(settings->method)->make(&input, list, &state->figures);
+    gn_radiance_map_unref(&rest);
+    return rc;
+}
+
 static int make_lights(struct gn_lighting_state *state, const struct gn_light_options *options,
                        struct gn_pool *pool, struct gn_error *out_error)
 {
@@ -97,14 +123,7 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
                                       &state->plan);
     if (rc == 0) {
         memcpy(&state->memory->settings, &settings, sizeof(settings));
-        const struct gn_light_input input = {.map = state->map,
-                                             .settings = &settings,
-                                             .plan = state->plan,
-                                             .previous = options->previous,
-                                             .remembered = recall(state, options->previous),
-                                             .memory = state->memory,
-                                             .pool = pool};
-        rc = gn_light_maker_get(settings.method)->make(&input, &list, &state->figures);
+        rc = make_from_rest(state, &settings, options->previous, pool, &list);
     }
     if (rc == 0)
         rc = take_lights(state, &list);

@@ -32,6 +32,8 @@ struct gn_light {
     float distance;       // m, of the piece's middle from the probe; INFINITY: distant; 0: the
                           // method left it to gn_lighting_state_create(), local model: distant
     float normal[3];      // of the piece, to the probe's side, unit; 0: not known, or distant
+    bool is_disc;         // a small sun kept whole: even light from all of the disc; else what
+                          // lies within angular_radius is not known to be even
     uint64_t id;          // its own in the state; the same light in the stream's next; 0: none
 };
 
@@ -102,9 +104,10 @@ struct gn_light_options {
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: GN_READ_SEED)
     unsigned mended;  // GN_READ_* not taken to the letter after all
     enum gn_light_weights weights; // of importance samples as lights; default equal
-    bool relaxed; // importance samples moved by the correction table: evener, but they move
-                  // with the light: for still pictures, not for streams
-    bool no_sh;   // leave the SH irradiance out
+    bool relaxed;  // importance samples moved by the correction table: evener, but they move
+                   // with the light: for still pictures, not for streams
+    bool no_discs; // small suns go through the method too (it is so in `seed`)
+    bool no_sh;    // leave the SH irradiance out
     struct gn_irradiance_options irradiance;
     bool no_lights;   // leave the lights out
     double smoothing; // s, time constant by which light at rest follows the frames, [0, 10]; 0: off
@@ -140,6 +143,7 @@ struct gn_light_figures {
     int n_bright;       // base regions with lights of their own
     int n_dark_lights;  // lights of merged dark regions
     int n_fill_lights;  // lights of the directions not shown
+    int n_discs;        // small suns kept whole
     int n_dropped;      // lights left out, the weakest, beyond GN_LIGHTS_MAX
     double split_gain;  // factor on MLR/MLEM by which the wanted number was met; 1: none
 };

@@ -3,6 +3,7 @@
 #include "server/render/internal.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -67,24 +68,71 @@ void gn_render_lights_pad(struct light_list *list, int multiple)
     }
 }
 
-/** Adds the state's first n lights; where those are not all, scaled to the sum of all. */
-static void add_lights(const struct gn_lighting_state *state, int n, struct light_list *list)
+static double get_luminance(const double rgb[static 3])
+{
+    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+/** So many directions that a disc's are as strong as a light in 64, and no step of its shadow's
+ * edge is coarser than an eighth. An even number; `spare`: how many more there may be. */
+static int count_directions(const struct gn_light *light, double share, int spare)
+{
+    if (!light->is_disc || !(light->angular_radius > 0))
+        return 1;
+    int n = 2 * (int)fmin(fmax(ceil(32 * share), 4), 16);
+    return n - 1 <= spare ? n : 1;
+}
+
+/** The light; of a disc, n directions of equal power spread over it: a spiral of equal areas, each
+ * point with its opposite, so that the mean direction is the disc's. */
+static void add_light(const struct gn_light *light, const double irradiance[static 3], int n,
+                      struct light_list *list)
+{
+    const double d[3] = {light->dir_world[0], light->dir_world[1], light->dir_world[2]};
+    if (n == 1) {
+        gn_render_lights_add(list, d, irradiance);
+        return;
+    }
+    // Two axes across d. Source: Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+    double sign = d[2] < 0 ? -1 : 1, a = -1 / (sign + d[2]), b = d[0] * d[1] * a;
+    const double across[2][3] = {{1 + sign * d[0] * d[0] * a, sign * b, -sign * d[0]},
+                                 {b, sign + d[1] * d[1] * a, -d[1]}};
+    double part[3] = {irradiance[0] / n, irradiance[1] / n, irradiance[2] / n};
+    double reach = sin(light->angular_radius);
+    for (int i = 0; i < n; i++) {
+        double r = reach * sqrt((2 * (i / 2) + 1.0) / n);
+        double phi = i / 2 * (M_PI * (3 - sqrt(5))) + i % 2 * M_PI, dir[3];
+        for (int k = 0; k < 3; k++)
+            dir[k] =
+                sqrt(1 - r * r) * d[k] + r * (cos(phi) * across[0][k] + sin(phi) * across[1][k]);
+        gn_render_lights_add(list, dir, part);
+    }
+}
+
+/** Adds the state's first n lights; where those are not all, scaled to the sum of all. spare: how
+ * many more directions discs may take. */
+static void add_lights(const struct gn_lighting_state *state, int n, int spare,
+                       struct light_list *list)
 {
     double all[3] = {0};
     double some[3] = {0};
-    for (int i = 0; i < state->n_lights && n < state->n_lights; i++) {
+    for (int i = 0; i < state->n_lights; i++) {
         for (int k = 0; k < 3; k++) {
             all[k] += state->lights[i].irradiance[k];
             some[k] += i < n ? state->lights[i].irradiance[k] : 0;
         }
     }
+    double energy = get_luminance(all);
     for (int i = 0; i < n; i++) {
         const struct gn_light *light = &state->lights[i];
-        const double dir[3] = {light->dir_world[0], light->dir_world[1], light->dir_world[2]};
         double irradiance[3];
         for (int k = 0; k < 3; k++)
-            irradiance[k] = light->irradiance[k] * (some[k] > 0 ? all[k] / some[k] : 1);
-        gn_render_lights_add(list, dir, irradiance);
+            irradiance[k] =
+                light->irradiance[k] * (n < state->n_lights && some[k] > 0 ? all[k] / some[k] : 1);
+        double share = energy > 0 ? get_luminance(irradiance) / energy : 0;
+        int n_directions = count_directions(light, share, spare);
+        spare -= n_directions - 1;
+        add_light(light, irradiance, n_directions, list);
     }
 }
 
@@ -96,10 +144,12 @@ int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list 
         return ret;
     for (int i = 0; i < blend->n; i++)
         n_all += blend->state[i]->n_lights;
+    int spare = n_all < GN_LIGHTS_MAX ? (int)(GN_LIGHTS_MAX - n_all) : 0;
     for (int i = 0; i < blend->n; i++) {
         int n = blend->state[i]->n_lights;
         int share = GN_LIGHTS_MAX / blend->n;
-        add_lights(blend->state[i], n_all > GN_LIGHTS_MAX && n > share ? share : n, list);
+        n = n_all > GN_LIGHTS_MAX && n > share ? share : n;
+        add_lights(blend->state[i], n, spare / blend->n, list);
         list->ends[i] = list->n;
     }
     return 0;

@@ -26,7 +26,7 @@ static const struct {
 } methods[] = {
     {GN_LIGHT_MEDIAN_CUT, 0},
     {GN_LIGHT_VARIANCE, 0},
-    {GN_LIGHT_INVERSION, 0.35}, // points with nothing nearest to them
+    {GN_LIGHT_INVERSION, 0.45}, // points with nothing nearest to them
     {GN_LIGHT_QUADTREE, 0.07},  // three lights more for each split
 };
 enum { N_METHODS = sizeof(methods) / sizeof(methods[0]) };
