@@ -11,10 +11,10 @@ static const double pi = 3.14159265358979323846;
 /* Directions that are looked at first, and lowest points that are added to them. */
 enum { N_SPREAD = 400, N_LOWEST = 12, N_BISECTIONS = 30 };
 
-enum { DEFAULT_ORDER = 2 };
+enum { DEFAULT_ORDER = 4 };
 
-/* What is taken out. */
-static const struct gn_compact_options compact = {.max_radius = 0.087, .min_share = 0.01};
+/* Wider spots cost the search more than their higher bands are worth. */
+static const struct gn_compact_options compact = {.min_share = 0.01};
 
 /* One direction, and what each band sends there. */
 struct sample {

@@ -17,7 +17,7 @@
 
 /** All-zero is the default. */
 struct gn_irradiance_options {
-    int order;        // of the harmonics, 2 or 4; default 2
+    int order;        // of the harmonics, 2 or 4; default 4
     bool dering;      // window them so that they are nowhere negative
     bool keep_lights; // leave compact lights in the harmonics, as in the paper
 };

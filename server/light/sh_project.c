@@ -33,72 +33,103 @@ struct block {
     vec light[3][BLOCK];
 };
 
-/*
- * Four texels from t on, n of them there. The mean of a harmonic of band l over a small texel of
- * solid angle w is (1 - l(l+1) w / 24) of its value in the middle: the first term of the texel's
- * own extent.
- */
-static void add_texels(const struct gn_radiance_map *map, size_t t, int n, int order,
-                       struct block *block)
+/* Four vectors [3] one after the other, as x, y and z. */
+static void split(const float *at, vec out[static 3])
 {
-    vec w = {0}, x = {0}, y = {0}, z = {0}, light[3] = {{0}}, p[GN_SH_MAX];
-    float any = 0;
-    for (int i = 0; i < n; i++, t++) {
-        const float *d = map->table->direction_probe + 3 * t, *l = map->radiance.data + 3 * t;
-        w[i] = map->solid_angle[t];
-        any += w[i];
-        x[i] = d[0];
-        y[i] = d[1];
-        z[i] = d[2];
-        for (int c = 0; c < 3; c++)
-            light[c][i] = l[c];
-    }
-    if (!(any > 0))
+    vec a = gn_sh_load(at), b = gn_sh_load(at + 4), c = gn_sh_load(at + 8);
+    vec t = __builtin_shufflevector(a, b, 1, 2, 4, 5),
+        u = __builtin_shufflevector(b, c, 2, 3, 5, 6);
+    out[0] = __builtin_shufflevector(a, u, 0, 3, 4, 6);
+    out[1] = __builtin_shufflevector(t, u, 0, 2, 5, 7);
+    out[2] = __builtin_shufflevector(t, c, 1, 3, 4, 7);
+}
+
+/*
+ * Four texels: their solid angles, directions and light. The mean of a harmonic of band l over a
+ * small texel of solid angle w is (1 - l(l+1) w / 24) of its value in the middle: the first term of
+ * the texel's own extent.
+ */
+static void add_texels(const float *solid_angle, const float *direction, const float *light,
+                       int order, struct block *block)
+{
+    const vec w = gn_sh_load(solid_angle), one = {1, 1, 1, 1};
+    if (!(w[0] + w[1] + w[2] + w[3] > 0))
         return;
-    const vec one = {1, 1, 1, 1};
-    GN_SH_POLYNOMIALS_2(p, one, x, y, z);
+    vec d[3], rgb[3], p[GN_SH_MAX];
+    split(direction, d);
+    split(light, rgb);
+    GN_SH_POLYNOMIALS_2(p, one, d[0], d[1], d[2]);
     if (order > 2)
-        GN_SH_POLYNOMIALS_4(p, x, y, z);
+        GN_SH_POLYNOMIALS_4(p, d[0], d[1], d[2]);
     for (int l = 0; l <= order; l++) {
         vec weight = w * (1.0f - w * ((float)(l * (l + 1)) / 24.0f));
         for (int k = l * l; k < (l + 1) * (l + 1); k++)
             block->p[k][block->n] = p[k] * weight;
     }
     for (int c = 0; c < 3; c++)
-        block->light[c][block->n] = light[c];
+        block->light[c][block->n] = rgb[c];
     block->n++;
+}
+
+static double add_lanes(vec v)
+{
+    return ((double)v[0] + (double)v[1]) + ((double)v[2] + (double)v[3]);
+}
+
+/* Two polynomials share the loads of the light; with k == m it is one. */
+static void add_pair(const struct block *block, int k, int m, struct gn_sh_sums *sums)
+{
+    vec rk = {0}, gk = {0}, bk = {0}, rm = {0}, gm = {0}, bm = {0};
+    for (int i = 0; i < block->n; i++) {
+        vec r = block->light[0][i], g = block->light[1][i], b = block->light[2][i];
+        rk += block->p[k][i] * r;
+        gk += block->p[k][i] * g;
+        bk += block->p[k][i] * b;
+        rm += block->p[m][i] * r;
+        gm += block->p[m][i] * g;
+        bm += block->p[m][i] * b;
+    }
+    sums->p[k][0] += add_lanes(rk);
+    sums->p[k][1] += add_lanes(gk);
+    sums->p[k][2] += add_lanes(bk);
+    if (m == k)
+        return;
+    sums->p[m][0] += add_lanes(rm);
+    sums->p[m][1] += add_lanes(gm);
+    sums->p[m][2] += add_lanes(bm);
 }
 
 static void add_block(const struct block *block, int order, struct gn_sh_sums *sums)
 {
-    for (int k = 0; k < gn_sh_get_count(order); k++) {
-        vec r = {0}, g = {0}, b = {0};
-        for (int i = 0; i < block->n; i++) {
-            r += block->p[k][i] * block->light[0][i];
-            g += block->p[k][i] * block->light[1][i];
-            b += block->p[k][i] * block->light[2][i];
-        }
-        for (int i = 0; i < LANES; i++) {
-            sums->p[k][0] += (double)r[i];
-            sums->p[k][1] += (double)g[i];
-            sums->p[k][2] += (double)b[i];
-        }
-    }
+    int n = gn_sh_get_count(order);
+    for (int k = 0; k < n; k += 2)
+        add_pair(block, k, k + 1 < n ? k + 1 : k, sums);
 }
 
 static void add_row(const struct gn_radiance_map *map, int y, int order, struct gn_sh_sums *sums)
 {
-    int width = map->radiance.width;
+    int width = map->radiance.width, whole = width - width % LANES;
     size_t start = (size_t)y * (size_t)width;
+    const float *w = map->solid_angle + start, *l = map->radiance.data + 3 * start;
+    const float *d = map->table->direction_probe + 3 * start;
     struct block block;
     block.n = 0;
-    for (int x = 0; x < width; x += LANES) {
-        add_texels(map, start + (size_t)x, width - x < LANES ? width - x : LANES, order, &block);
-        if (block.n == BLOCK || x + LANES >= width) {
+    for (int x = 0; x < whole; x += LANES) {
+        add_texels(w + x, d + 3 * x, l + 3 * x, order, &block);
+        if (block.n == BLOCK) {
             add_block(&block, order, sums);
             block.n = 0;
         }
     }
+    if (whole < width) { // the last few, filled up with texels that cover nothing
+        float tail[7 * LANES] = {0};
+        size_t n = (size_t)(width - whole) * sizeof(float);
+        memcpy(tail, w + whole, n);
+        memcpy(tail + LANES, d + 3 * whole, 3 * n);
+        memcpy(tail + 4 * LANES, l + 3 * whole, 3 * n);
+        add_texels(tail, tail + LANES, tail + 4 * LANES, order, &block);
+    }
+    add_block(&block, order, sums);
 }
 
 static void project_item(void *context, int item, int worker)
