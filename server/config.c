@@ -39,6 +39,9 @@ static void get_light(const struct gn_options *o, const char *room, struct gn_li
         .mended = gn_options_get_set(o, "room", room, "light-mended"),
         .weights = (enum gn_light_weights)gn_options_get_enum(o, "room", room, "light-weights"),
         .relaxed = gn_options_get_bool(o, "room", room, "light-relaxed"),
+        .irradiance = {.order = gn_options_get_enum(o, "room", room, "sh-order") == 0 ? 2 : 4,
+                       .dering = gn_options_get_bool(o, "room", room, "sh-dering"),
+                       .keep_lights = gn_options_get_bool(o, "room", room, "sh-keep-lights")},
     };
 }
 
@@ -58,9 +61,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
         .map = {.ground_albedo = (float)albedo, .no_fill = albedo == 0},
         .render =
             {
-                .shading = gn_options_get_enum(o, "room", room, "shading") == 1
-                               ? GN_SHADING_IRRADIANCE_MAP
-                               : GN_SHADING_LIGHTS,
+                .shading = (enum gn_shading)gn_options_get_enum(o, "room", room, "shading"),
                 .no_shadow = !gn_options_get_bool(o, "room", room, "shadows"),
                 .shadow_unweighted = !gn_options_get_bool(o, "room", room, "shadow-cosine"),
                 .shadow_ignore_real = !gn_options_get_bool(o, "room", room, "shadow-real-blockers"),

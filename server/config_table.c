@@ -95,10 +95,18 @@ static const struct gn_option table[] = {
      .default_value = "0.2",
      .help = "Reflectance of the ground that fills the half of the sphere that a fisheye does not "
              "show; 0: black."},
-    {ROOM, .key = "shading", .type = GN_OPTION_ENUM, .choices = "lights|irradiance-map",
+    {ROOM, .key = "shading", .type = GN_OPTION_ENUM, .choices = GN_SHADING_NAMES,
      .default_value = "lights",
      .help = "How diffuse virtual objects are lit: by the lights, with shadow rays, or by the "
-             "irradiance map, the paper's two variants."},
+             "irradiance of their normals, without shadows on them: the paper's two variants."},
+    {ROOM, .key = "sh-order", .type = GN_OPTION_ENUM, .choices = "2|4", .default_value = "4",
+     .help = "Order of the irradiance's spherical harmonics: 9 or 25 coefficients."},
+    {ROOM, .key = "sh-dering", .type = GN_OPTION_BOOL, .default_value = "false",
+     .help = "Smooths the harmonics until they are nowhere negative; false: what is negative "
+             "counts as 0, which is nearer to the truth on photographs."},
+    {ROOM, .key = "sh-keep-lights", .type = GN_OPTION_BOOL, .default_value = "false",
+     .help = "Leaves small bright lights in the harmonics, as the paper does; false: they are "
+             "added exactly."},
     {ROOM, .key = "shadows", .type = GN_OPTION_BOOL, .default_value = "true",
      .help = "Virtual objects cast shadows on real surfaces."},
     {ROOM, .key = "shadow-cosine", .type = GN_OPTION_BOOL, .default_value = "true",

@@ -81,12 +81,16 @@ static json_t *make_light(const struct gn_room_figures *f)
     if (!f->has_light)
         return json_pack("{s:b, s:b}", "lit", 0, "environment_frame_waiting",
                          f->has_environment_waiting);
-    return json_pack("{s:b, s:b, s:I, s:f, s:i, s:I, s:{s:f, s:f, s:f, s:f}}", //
+    json_t *sh = f->has_sh ? json_pack("{s:i, s:i, s:f, s:f}", "order", f->sh_order, "lights",
+                                       f->n_sh_lights, "dering_lambda", f->sh_lambda,
+                                       "min_irradiance", f->sh_min)
+                           : json_null();
+    return json_pack("{s:b, s:b, s:I, s:f, s:i, s:I, s:o, s:{s:f, s:f, s:f, s:f}}", //
                      "lit", 1, "environment_frame_waiting", f->has_environment_waiting, "sequence",
                      (json_int_t)f->light_sequence, "age_ms", get_ms_since(f->light_capture_ns),
                      "lights", f->n_lights, "published",
                      (json_int_t)f->light_published, //
-                     "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh",
+                     "sh", sh, "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh",
                      f->light_ms_sh, "lights", f->light_ms_lights);
 }
 

@@ -71,6 +71,9 @@ void gn_irradiance_follow(struct gn_irradiance *irradiance, const struct gn_irra
 void gn_irradiance_get(const struct gn_irradiance *irradiance, const double normal[static 3],
                        double out_irradiance[static 3]);
 
+/** Wide enough that a bilinear look-up is within 0.5 % of band 2. */
+#define GN_IRRADIANCE_MAP_WIDTH 64
+
 /**
  * E of the lat-long directions (axes of common/projection.h, in world). map inited by the call.
  * Returns as gn_image_init.

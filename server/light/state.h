@@ -189,7 +189,6 @@ GN_MUST_USE int gn_lighting_state_create(const struct gn_environment_frame *fram
                                          struct gn_pool *pool, struct gn_lighting_state **out_state,
                                          struct gn_error *out_error);
 /**
-<<<<<<< HEAD
  * The same light at a later time, for a frame that equals the one it was made from: map, tables and
  * the lights before smoothing are shared; smoothing goes on. Returns 0 or -ENOMEM.
  */
@@ -209,10 +208,6 @@ GN_MUST_USE int gn_lighting_state_complete(const struct gn_lighting_state *state
 /**
  * A state of near light only, for a room without a probe: its map is black, sequence 0. options as
  * above, with their emission. Returns 0 or a negative errno and a sentence.
-=======
- * A state of near light only, for a room without a probe: its map is black, its sequence 0. Returns
- * 0 or a negative errno and a sentence.
->>>>>>> d11e8a0 (light: lamps and emissive meshes as near lights)
  */
 GN_MUST_USE int gn_lighting_state_create_dark(struct gn_emission *emission,
                                               const struct gn_light_options *options,

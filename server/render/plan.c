@@ -94,7 +94,7 @@ static const char *why_not_virtual(const struct frame *frame, const double slope
 static const char *why_not_light_loop(const struct frame *frame)
 {
     const struct gn_render_options *options = &frame->options;
-    if (options->shading == GN_SHADING_IRRADIANCE_MAP && options->quality != GN_QUALITY_REFERENCE)
+    if (options->shading == GN_SHADING_IRRADIANCE && options->quality != GN_QUALITY_REFERENCE)
         return "irradiance shading needs no loop over lights";
     if (frame->lights->n == 0)
         return "no light";

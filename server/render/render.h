@@ -24,9 +24,12 @@ enum gn_quality {
 
 /**
  * How diffuse virtual objects are lit: the paper's two variants, the lights with shadow rays or the
- * SH irradiance of the normal. REFERENCE integrates the map whatever is asked for here.
+ * irradiance of the normal, evaluated where the paper looks up a map of it. REFERENCE integrates
+ * the map whatever is asked for here.
  */
-enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE_MAP = 1 };
+enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE = 1 };
+/** Their names, as a list of choices in that order. */
+#define GN_SHADING_NAMES "lights|irradiance"
 
 /** All-zero is the default of the quality. */
 struct gn_render_options {

@@ -140,7 +140,7 @@ static int reserve_texels(struct gn_renderer *renderer)
 static const char *check_light(const struct gn_blend *blend,
                                const struct gn_render_options *options)
 {
-    bool needs_sh = options->shading == GN_SHADING_IRRADIANCE_MAP;
+    bool needs_sh = options->shading == GN_SHADING_IRRADIANCE;
     for (int i = 0; i < blend->n && options->quality != GN_QUALITY_REFERENCE; i++) {
         if (blend->state[i]->n_lights > GN_LIGHTS_MAX)
             return "render: a lighting state has more lights than are used";
@@ -159,7 +159,7 @@ static int check_request(const struct gn_camera *camera, const struct gn_blend *
         return gn_error_set(out_error, -EINVAL, "camera: %s", reason);
     if (options->quality < GN_QUALITY_INTERACTIVE || options->quality > GN_QUALITY_REFERENCE)
         return gn_error_set(out_error, -EINVAL, "render: unknown quality %d", options->quality);
-    if (options->shading < GN_SHADING_LIGHTS || options->shading > GN_SHADING_IRRADIANCE_MAP)
+    if (options->shading < GN_SHADING_LIGHTS || options->shading > GN_SHADING_IRRADIANCE)
         return gn_error_set(out_error, -EINVAL, "render: unknown shading %d", options->shading);
     if (options->bounces < 0 || options->bounces > MAX_BOUNCES)
         return gn_error_set(out_error, -EINVAL, "render: %d bounces, must be 0 to %d",

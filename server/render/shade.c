@@ -76,7 +76,7 @@ static void reflect_irradiance(struct sample *s, const double irradiance[static 
         s->radiance[k] += (double)s->through[k] * s->surface.albedo[k] / M_PI * irradiance[k];
 }
 
-static void shade_by_irradiance_map(const struct frame *frame, struct sample *s)
+static void shade_by_irradiance(const struct frame *frame, struct sample *s)
 {
     const double normal[3] = {s->surface.normal_shading[0], s->surface.normal_shading[1],
                               s->surface.normal_shading[2]};
@@ -114,8 +114,8 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
             continue;
-        if (frame->options.shading == GN_SHADING_IRRADIANCE_MAP)
-            shade_by_irradiance_map(frame, s);
+        if (frame->options.shading == GN_SHADING_IRRADIANCE)
+            shade_by_irradiance(frame, s);
         else
             scratch->lit[m++] = i;
     }

@@ -27,7 +27,8 @@ struct gn_cli_request {
     struct gn_options *options; // owned
     const char *scene, *env, *camera, *out;
     // May be NULL:
-    const char *env_params, *background, *report, *light_map, *shadow_png, *composite_png;
+    const char *env_params, *background, *report, *light_map, *irradiance_map, *shadow_png,
+        *composite_png;
     bool has_projection;
     enum gn_projection_type projection;
     bool has_world_from_env;

@@ -9,7 +9,7 @@
 
 // In the order of their enums.
 #define QUALITIES "interactive|seed|reference"
-#define SHADINGS "lights|irradiance"
+#define SHADINGS GN_SHADING_NAMES
 
 static const struct gn_option table[] = {
     {.key = "scene",
@@ -54,7 +54,21 @@ static const struct gn_option table[] = {
      .type = GN_OPTION_ENUM,
      .choices = SHADINGS,
      .default_value = "lights",
-     .help = "Virtual objects lit by the lights with shadow rays, or by the irradiance map."},
+     .help = "Diffuse virtual objects lit by the lights with shadow rays, or by the irradiance of "
+             "their normals, without shadows on them: the paper's two variants."},
+    {.key = "sh-order",
+     .type = GN_OPTION_ENUM,
+     .choices = "2|4",
+     .default_value = "4",
+     .help = "Order of the irradiance's spherical harmonics: 9 or 25 coefficients."},
+    {.key = "sh-dering",
+     .type = GN_OPTION_BOOL,
+     .help = "Smooths the harmonics until they are nowhere negative; without it what is negative "
+             "counts as 0, which is nearer to the truth on photographs."},
+    {.key = "sh-keep-lights",
+     .type = GN_OPTION_BOOL,
+     .help = "Leaves small bright lights in the harmonics, as the paper does; without it they are "
+             "added exactly."},
     {.key = "lights",
      .type = GN_OPTION_INT,
      .min = 1,
@@ -166,6 +180,10 @@ static const struct gn_option table[] = {
      .value_name = "FILE",
      .help = "A PNG of the light to look at: the map, lat-long in world axes, and the lights made "
              "of it."},
+    {.key = "irradiance-map",
+     .value_name = "FILE",
+     .help = "An EXR of the irradiance in W/m^2 (not divided by pi), 64 x 32, lat-long in world "
+             "axes."},
     {.key = "shadow-png", .value_name = "FILE", .help = "The shadow factor to look at."},
     {.key = "composite-png",
      .value_name = "FILE",
@@ -259,6 +277,7 @@ static void read_paths(struct gn_cli_request *request)
     request->out = get_path(request, "out");
     request->report = get_path(request, "report");
     request->light_map = get_path(request, "light-map");
+    request->irradiance_map = get_path(request, "irradiance-map");
     request->shadow_png = get_path(request, "shadow-png");
     request->composite_png = get_path(request, "composite-png");
 }
@@ -301,6 +320,11 @@ static void read_numbers(struct gn_cli_request *request)
     read_light_readings(request);
     render->shadow_unweighted = !get_bool(request, "shadow-cosine");
     render->shadow_ignore_real = !get_bool(request, "shadow-real-blockers");
+    request->light.irradiance = (struct gn_irradiance_options){
+        .order = get_enum(request, "sh-order") == 0 ? 2 : 4,
+        .dering = get_bool(request, "sh-dering"),
+        .keep_lights = get_bool(request, "sh-keep-lights"),
+    };
     request->has_projection = is_set(request, "env-projection");
     if (request->has_projection)
         request->projection = (enum gn_projection_type)get_enum(request, "env-projection");

@@ -13,13 +13,14 @@
 #include "server/light/light_picture.h"
 #include "server/render_cli/cli.h"
 
-#define MAX_OUTPUTS 5
+#define MAX_OUTPUTS 6
 
 /** All paths that are written, the layers last. Returns their number. */
 static int list_outputs(const struct gn_cli_request *request, const char *out[MAX_OUTPUTS])
 {
-    const char *const all[MAX_OUTPUTS] = {request->report, request->light_map, request->shadow_png,
-                                          request->composite_png, request->out};
+    const char *const all[MAX_OUTPUTS] = {request->report,         request->light_map,
+                                          request->irradiance_map, request->shadow_png,
+                                          request->composite_png,  request->out};
     int n = 0;
     for (int i = 0; i < MAX_OUTPUTS; i++) {
         if (all[i])
@@ -149,6 +150,23 @@ static int write_light_map(const char *path, const struct gn_lighting_state *lig
     return ret;
 }
 
+static int write_irradiance_map(const char *path, const struct gn_lighting_state *light,
+                                struct gn_error *out_error)
+{
+    static const char *const names[] = {"R", "G", "B"};
+    struct gn_exr_channel channels[3];
+    struct gn_image map = {0};
+    int ret = gn_irradiance_make_map(&light->irradiance, GN_IRRADIANCE_MAP_WIDTH,
+                                     GN_IRRADIANCE_MAP_WIDTH / 2, &map);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "%s: out of memory", path);
+    int n = 0;
+    add_channels(channels, &n, names, &map);
+    ret = gn_exr_write_file(path, map.width, map.height, channels, n, out_error);
+    gn_image_finish(&map);
+    return ret;
+}
+
 static int make_composite(const struct gn_cli_result *result, struct gn_pool *pool,
                           struct gn_image *out, struct gn_error *out_error)
 {
@@ -171,6 +189,10 @@ static int write_all(const struct gn_cli_request *request, const struct gn_cli_r
     }
     if (ret == 0 && request->light_map) {
         ret = write_light_map(request->light_map, result->light, pool, out_error);
+        *n_written += ret == 0;
+    }
+    if (ret == 0 && request->irradiance_map) {
+        ret = write_irradiance_map(request->irradiance_map, result->light, out_error);
         *n_written += ret == 0;
     }
     if (ret == 0 && request->shadow_png) {

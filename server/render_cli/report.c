@@ -52,20 +52,49 @@ static json_t *make_map(const struct gn_radiance_map *map)
                      f->n_inf, "negative_texels", f->n_negative, "clipped_texels", f->n_clipped);
 }
 
+/** L_lm [R, G, B] one after the other, and what made them the irradiance. */
+static json_t *make_sh(const struct gn_lighting_state *light)
+{
+    const struct gn_irradiance *irradiance = &light->irradiance;
+    if (!light->has_sh)
+        return json_null();
+    json_t *coefficients = json_array(), *lights = json_array();
+    for (int k = 0; k < gn_sh_get_count(irradiance->order); k++) {
+        const double *l = light->sh[k];
+        // As in make_plan(): what fails here makes the whole fail.
+        if (json_array_append_new(coefficients, json_pack("[f, f, f]", l[0], l[1], l[2])) < 0)
+            goto fail;
+    }
+    for (int i = 0; i < irradiance->n_lights; i++) {
+        const double *d = irradiance->lights[i].dir_world, *e = irradiance->lights[i].irradiance;
+        if (json_array_append_new(lights, json_pack("{s:[f, f, f], s:[f, f, f]}", "direction", d[0],
+                                                    d[1], d[2], "irradiance", e[0], e[1], e[2])) <
+            0)
+            goto fail;
+    }
+    return json_pack("{s:i, s:o, s:o, s:f, s:f}", "order", irradiance->order, "radiance",
+                     coefficients, "lights", lights, "dering_lambda", irradiance->lambda,
+                     "min_irradiance", irradiance->min_luminance);
+fail:
+    json_decref(coefficients);
+    json_decref(lights);
+    return NULL;
+}
+
 /** NULL where memory runs out. */
 static json_t *make_report(const struct gn_cli_request *request, const struct gn_cli_result *result)
 {
     const struct gn_render_report *r = result->report;
     const struct gn_scene *scene = result->scene;
     return json_pack(
-        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
+        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
         "s:I, s:{s:i, s:i, s:i}}",
         "version", GN_VERSION, "quality", gn_cli_get_quality_name(request->render.quality),
         "bounces", request->render.bounces, "width", result->camera->width, "height",
         result->camera->height, "threads", result->n_threads, "light_method",
         gn_light_method_get_name(request->light.method), "plan", make_plan(r), "timings_ms",
         make_timings(result), "rays", make_rays(r), "environment", make_map(result->light->map),
-        "lights", r->n_lights, "estimated_error",
+        "sh", make_sh(result->light), "lights", r->n_lights, "estimated_error",
         r->estimated_error < 0.0 ? json_null() : json_real(r->estimated_error), "virtual_pixels",
         (json_int_t)r->n_virtual_pixels, "shadow_pixels", (json_int_t)r->n_shadow_pixels,
         "refined_pixels", (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects,

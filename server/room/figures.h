@@ -42,6 +42,11 @@ struct gn_room_figures {
     uint64_t light_sequence, light_published;
     int64_t light_capture_ns;
     int n_lights;
+    bool has_sh;      // the irradiance's harmonics are made
+    int sh_order;     // 2 or 4
+    int n_sh_lights;  // small bright lights kept out of them
+    double sh_lambda; // of their window; 0: none
+    double sh_min;    // W/m^2, lowest luminance of their irradiance before it
     double light_ms_map, light_ms_sh, light_ms_lights, light_ms_decode;
     bool has_receipt;
     int last_width, last_height;        // px, first view of the last result

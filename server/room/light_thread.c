@@ -188,6 +188,11 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
     f->light_published++;
     f->light_ms_decode = ms_decode;
     f->light_ms_map = mine->ms_map;
+    f->has_sh = mine->has_sh;
+    f->sh_order = mine->irradiance.order;
+    f->n_sh_lights = mine->irradiance.n_lights;
+    f->sh_lambda = mine->irradiance.lambda;
+    f->sh_min = mine->irradiance.min_luminance;
     f->light_ms_sh = mine->ms_sh;
     f->light_ms_lights = mine->ms_lights;
     take_subscribers_locked(room, false, &subscribers);

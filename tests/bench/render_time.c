@@ -159,7 +159,7 @@ static void print_paper_row(struct bench *b, const struct paper_row *row, bool h
     bool is_map = row->n_lights == 76;
     struct gn_render_options options = {.quality = GN_QUALITY_SEED,
                                         .shading =
-                                            is_map ? GN_SHADING_IRRADIANCE_MAP : GN_SHADING_LIGHTS,
+                                            is_map ? GN_SHADING_IRRADIANCE : GN_SHADING_LIGHTS,
                                         .no_shadow = !has_shadow};
     struct gn_lighting_state *light = make_seed_light(b, row->n_lights);
     aim(b, row->width);

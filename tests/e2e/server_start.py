@@ -41,7 +41,7 @@ def test_configuration():
     refuse(Room('lihgts = 4'), 'gnomond.conf:', 'lihgts', 'lights')
     refuse(Room('lights = many'), 'gnomond.conf:', 'lights', 'many')
     refuse(Room('lights = 0'), 'gnomond.conf:', 'lights', '4096')
-    refuse(Room('shading = phong'), 'shading', 'irradiance-map')
+    refuse(Room('shading = phong'), 'shading', 'lights', 'irradiance')
     refuse(Room(server='max-connections = -3'), 'max-connections')
     refuse(Room('[roon x]'), 'roon')
     room = Room()

@@ -201,7 +201,7 @@ static void test_picture_is_weighted_sum(void **unused)
     // contrast.
     const struct gn_render_options lights = {.quality = GN_QUALITY_SEED};
     const struct gn_render_options irradiance = {.quality = GN_QUALITY_SEED,
-                                                 .shading = GN_SHADING_IRRADIANCE_MAP};
+                                                 .shading = GN_SHADING_IRRADIANCE};
     const struct gn_render_options reference = {.quality = GN_QUALITY_REFERENCE};
     check_virtual(GN_MATERIAL_DIFFUSE, &lights, 1e-5);
     check_virtual(GN_MATERIAL_DIFFUSE, &irradiance, 1e-5);

@@ -214,7 +214,7 @@ static void test_every_reason(void **state)
     gn_test_stage_render(&stage, &none);
     assert_left_out(&stage, "shadow", "not asked for");
     assert_int_equal(stage.report.rays_shadow, 0);
-    const struct gn_render_options irradiance = {.shading = GN_SHADING_IRRADIANCE_MAP};
+    const struct gn_render_options irradiance = {.shading = GN_SHADING_IRRADIANCE};
     gn_test_stage_render(&stage, &irradiance);
     assert_left_out(&stage, "shade", "irradiance shading needs no loop over lights");
     assert_int_equal(stage.report.rays_shade, 0);

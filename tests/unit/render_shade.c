@@ -56,7 +56,7 @@ static void test_constant_map_gives_albedo_times_radiance(void **state)
         // The reference sees that nothing is above the plane.
         assert_int_equal(stage.report.rays_shade > 0, quality != GN_QUALITY_REFERENCE);
     }
-    const struct gn_render_options irradiance = {.shading = GN_SHADING_IRRADIANCE_MAP};
+    const struct gn_render_options irradiance = {.shading = GN_SHADING_IRRADIANCE};
     gn_test_stage_render(&stage, &irradiance);
     check_pixel(&stage, 4, 4, 0.25, 1.5, 1.5, 1e-3);
     assert_int_equal(stage.report.rays_shade, 0);

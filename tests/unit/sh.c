@@ -336,6 +336,323 @@ static void turning_the_probe_turns_the_light(void **unused)
     }
 }
 
+/* The basis by the associated Legendre recurrences, apart from the polynomials under test. */
+static double get_harmonic(int l, int m, const double d[static 3])
+{
+    int k = m < 0 ? -m : m;
+    double s = sqrt(fmax(0, 1 - d[2] * d[2])), p = 1, before = 0, norm = (2 * l + 1) / (4 * pi);
+    for (int i = 1; i <= k; i++)
+        p *= (2 * i - 1) * s;
+    for (int i = k + 1; i <= l; i++) {
+        double next = ((2 * i - 1) * d[2] * p - (i + k - 1) * before) / (i - k);
+        before = p;
+        p = next;
+    }
+    for (int i = l - k + 1; i <= l + k; i++)
+        norm /= i;
+    double phi = atan2(d[1], d[0]);
+    double wave = m == 0 ? 1 : sqrt(2) * (m > 0 ? cos(k * phi) : sin(k * phi));
+    return sqrt(norm) * p * wave;
+}
+
+static void basis_is_legendre_times_waves(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < 200; i++) {
+        double d[3], basis[GN_SH_MAX];
+        get_sphere_point(i, 200, d);
+        gn_sh_get_basis(4, d, basis);
+        for (int l = 0; l <= 4; l++)
+            for (int m = -l; m <= l; m++)
+                assert_near(basis[l * (l + 1) + m], get_harmonic(l, m, d), 1e-13);
+    }
+}
+
+static void cosine_factors_are_the_integrals(void **unused)
+{
+    (void)unused;
+    enum { N = 20000 };
+    for (int l = 0; l <= 4; l++) { // 2 pi times the integral of z P_l(z) over [0, 1]
+        double sum = 0;
+        for (int i = 0; i < N; i++) {
+            double z = (i + 0.5) / N, d[3] = {sqrt(1 - z * z), 0, z};
+            sum += z * get_harmonic(l, 0, d) * sqrt(4 * pi / (2 * l + 1)) / N;
+        }
+        assert_near(gn_sh_get_cosine_factor(l), 2 * pi * sum, 1e-8);
+    }
+}
+
+/* L_lm of a disc of even radiance about +z, of unit irradiance at normal incidence; radius 0: of a
+ * point. In closed form: the mean of P_l over the disc is (P_l-1(c) - P_l+1(c)) / ((2 l + 1) (1 -
+ * c)). */
+static void make_disc(double radius, double sh[GN_SH_MAX][3])
+{
+    double legendre[6] = {1, cos(radius)};
+    for (int l = 2; l < 6; l++)
+        legendre[l] = ((2 * l - 1) * legendre[1] * legendre[l - 1] - (l - 1) * legendre[l - 2]) / l;
+    memset(sh, 0, GN_SH_MAX * sizeof(*sh));
+    for (int l = 0; l <= 4; l++) {
+        double mean = 1;
+        if (radius > 0 && l > 0)
+            mean = (legendre[l - 1] - legendre[l + 1]) / ((2 * l + 1) * (1 - legendre[1]));
+        for (int c = 0; c < 3; c++)
+            sh[l * (l + 1)][c] = sqrt((2 * l + 1) / (4 * pi)) * mean;
+    }
+}
+
+/* The irradiance of that disc with the normal at angle theta, by rings of it. */
+static double get_disc_irradiance(double radius, double theta)
+{
+    enum { N = 400 };
+    double sum = 0;
+    if (radius == 0)
+        return fmax(0, cos(theta));
+    for (int i = 0; i < N; i++) { // rings of equal solid angle, each in closed form
+        double z = 1 - (1 - cos(radius)) * (i + 0.5) / N, a = z * cos(theta);
+        double b = sqrt(1 - z * z) * sin(theta), half = b > 0 ? acos(fmax(-1, fmin(1, -a / b))) : 0;
+        if (a >= b)
+            half = pi;
+        else if (a <= -b)
+            half = 0;
+        sum += (a * half + b * sin(half)) / pi / N;
+    }
+    return sum;
+}
+
+struct errors {
+    double worst, mean, low, high;
+};
+
+static struct errors judge_disc(int order, double radius)
+{
+    enum { N = 2000 };
+    double sh[GN_SH_MAX][3];
+    struct errors out = {.low = 1};
+    make_disc(radius, sh);
+    for (int i = 0; i <= N; i++) {
+        double theta = pi * i / N, n[3] = {sin(theta), 0, cos(theta)}, e[3];
+        gn_sh_get_irradiance(order, CONST_SH(sh), n, e);
+        double error = fabs(e[0] - get_disc_irradiance(radius, theta));
+        out.worst = fmax(out.worst, error);
+        out.mean += 0.5 * sin(theta) * error * pi / N;
+        out.low = fmin(out.low, e[0]);
+        out.high = fmax(out.high, e[0]);
+    }
+    return out;
+}
+
+static void points_and_discs_err_as_known(void **unused)
+{
+    (void)unused;
+    struct errors two = judge_disc(2, 0), four = judge_disc(4, 0);
+    assert_near(two.worst, 0.09375, 1e-5);
+    assert_near(two.mean, 0.0307, 1e-4);
+    assert_near(two.low, -0.0396, 1e-4);
+    assert_near(two.high, 1.0625, 1e-5);
+    assert_near(four.worst, 0.0586, 1e-4);
+    assert_near(four.mean, 0.0148, 1e-4);
+    assert_near(four.low, -0.031, 5e-4);
+    assert_near(four.high, 0.969, 5e-4);
+    static const struct {
+        double radius_deg, worst;
+    } discs[] = {{0.5, 0.092}, {8, 0.067}, {16, 0.055}, {32, 0.036}, {64, 0.015}};
+    for (size_t i = 0; i < sizeof(discs) / sizeof(discs[0]); i++) { // of order 2, over the peak
+        double radius = discs[i].radius_deg * pi / 180;
+        double peak = 0.5 * (1 + cos(radius));
+        struct errors e = judge_disc(2, radius);
+        print_message("disc %4.1f deg: order 2 off by %.4f of its peak, order 4 by %.4f\n",
+                      discs[i].radius_deg, e.worst / peak, judge_disc(4, radius).worst / peak);
+        assert_near(e.worst / peak, discs[i].worst, 1.5e-3);
+    }
+}
+
+static double get_low(const struct gn_irradiance *irradiance)
+{
+    double low = INFINITY;
+    enum { N = 50000 };
+    for (int i = 0; i < N; i++) {
+        double n[3], basis[GN_SH_MAX], y = 0;
+        get_sphere_point(i, N, n);
+        gn_sh_get_basis(irradiance->order, n, basis);
+        for (int k = 0; k < gn_sh_get_count(irradiance->order); k++)
+            y += basis[k] * (0.2126 * irradiance->sh[k][0] + 0.7152 * irradiance->sh[k][1] +
+                             0.0722 * irradiance->sh[k][2]);
+        low = fmin(low, y);
+    }
+    return low;
+}
+
+static void dering_is_the_smallest_window(void **unused)
+{
+    (void)unused;
+    double sh[GN_SH_MAX][3] = {{0}};
+    struct gn_irradiance irradiance;
+    const double dir[3] = {0.36, 0.48, 0.8}, light[3] = {1, 1, 1};
+    for (int order = 2; order <= 4; order += 2) {
+        memset(sh, 0, sizeof(sh));
+        gn_sh_add_light(order, dir, light, sh);
+        gn_irradiance_init(&irradiance, order, CONST_SH(sh), NULL, 0, false);
+        assert_true(irradiance.lambda == 0);
+        assert_near(irradiance.min_luminance, order == 2 ? -0.0396 : -0.031, 5e-4);
+        gn_irradiance_init(&irradiance, order, CONST_SH(sh), NULL, 0, true);
+        if (order == 2) { // w_1 = 0.584, w_2 = 0.135
+            assert_near(irradiance.lambda, 0.178, 1e-3);
+            assert_near(1 / (1 + 4 * irradiance.lambda), 0.584, 1e-3);
+            assert_near(1 / (1 + 36 * irradiance.lambda), 0.135, 1e-3);
+        }
+        double low = get_low(&irradiance), e[3];
+        print_message("order %d: lambda %.4f, lowest %.2g\n", order, irradiance.lambda, low);
+        assert_true(low >= -1e-6 && low < 1e-3);
+        gn_irradiance_get(&irradiance, dir, e);
+        if (order == 2)
+            assert_near(e[1], 0.58, 0.05);
+    }
+    /* Real light: its luminance decides, all channels get one window. */
+    gn_irradiance_init(&irradiance, 2, grace, NULL, 0, true);
+    assert_true(irradiance.min_luminance > 0 && irradiance.lambda == 0);
+    double blue[GN_SH_MAX][3];
+    memset(blue, 0, sizeof(blue));
+    for (int k = 0; k < 9; k++)
+        for (int c = 0; c < 3; c++)
+            blue[k][c] = grace[k][2];
+    gn_irradiance_init(&irradiance, 2, CONST_SH(blue), NULL, 0, true);
+    assert_near(irradiance.min_luminance, -0.0096, 5e-5);
+    assert_true(irradiance.lambda > 0 && get_low(&irradiance) >= -1e-6);
+    memset(blue, 0, sizeof(blue));
+    gn_irradiance_init(&irradiance, 4, CONST_SH(blue), NULL, 0, true); // black
+    assert_true(irradiance.lambda == 0 && irradiance.min_luminance == 0);
+}
+
+static void lights_taken_out_are_exact(void **unused)
+{
+    (void)unused;
+    const struct gn_irradiance_light sun = {{0.6, 0, 0.8}, {50, 40, 30}};
+    for (int order = 2; order <= 4; order += 2) {
+        double sh[GN_SH_MAX][3] = {{0}}, mean = 0;
+        const double up[3] = {0, 0, 1}, sky[3] = {0.1, 0.2, 0.3};
+        for (int c = 0; c < 3; c++) // a sky of radiance 1, and a little from above
+            sh[0][c] = sqrt(4 * pi);
+        gn_sh_add_light(order, sun.dir_world, sun.irradiance, sh);
+        struct gn_irradiance irradiance;
+        gn_irradiance_init(&irradiance, order, CONST_SH(sh), &sun, 1, false);
+        enum { N = 20000 };
+        for (int i = 0; i < N; i++) {
+            double n[3], e[3];
+            get_sphere_point(i, N, n);
+            gn_irradiance_get(&irradiance, n, e);
+            double cosine = fmax(0, n[0] * sun.dir_world[0] + n[2] * sun.dir_world[2]);
+            for (int c = 0; c < 3; c++)
+                assert_near(e[c], pi + cosine * sun.irradiance[c], 1e-12 * 50);
+            mean += e[0] / N;
+        }
+        assert_near(mean, sqrt(pi) / 2 * sh[0][0], 1e-5 * mean); // no energy comes or goes
+        /* A light that the harmonics do not hold changes no band up to the order. */
+        gn_sh_add_light(order, up, sky, sh);
+        gn_irradiance_init(&irradiance, order, CONST_SH(sh), &sun, 1, false);
+        assert_near(irradiance.sh[0][1], pi * (sqrt(4 * pi) + 0.2 * 0.5 / sqrt(pi)), 1e-12);
+    }
+}
+
+static void lights_follow_the_frames(void **unused)
+{
+    (void)unused;
+    const struct gn_irradiance_light lamp = {{0, 0, 1}, {8, 8, 8}};
+    double dark[GN_SH_MAX][3] = {{0}}, lit[GN_SH_MAX][3] = {{0}}, now[GN_SH_MAX][3];
+    for (int c = 0; c < 3; c++)
+        dark[0][c] = lit[0][c] = sqrt(4 * pi);
+    gn_sh_add_light(4, lamp.dir_world, lamp.irradiance, lit);
+    struct gn_irradiance before, after;
+    gn_irradiance_init(&before, 4, CONST_SH(lit), &lamp, 1, false);
+    gn_irradiance_init(&after, 4, CONST_SH(dark), NULL, 0, false);
+    for (int k = 0; k < GN_SH_MAX; k++)
+        for (int c = 0; c < 3; c++)
+            now[k][c] = 0.75 * lit[k][c] + 0.25 * dark[k][c];
+    gn_irradiance_follow(&after, &before, 0.25, CONST_SH(now), false); // it fades
+    assert_int_equal(after.n_lights, 1);
+    for (int i = 0; i < 50; i++) {
+        double n[3], e[3];
+        get_sphere_point(i, 50, n);
+        gn_irradiance_get(&after, n, e);
+        assert_near(e[0], pi + 6 * fmax(0, n[2]), 1e-12);
+    }
+}
+
+/* Sums over the texels, written apart: the same formula in double, and no blocks. */
+static void check_rounding(struct light_fixture *f)
+{
+    struct gn_radiance_map *map = make_map(f);
+    double sum[GN_SH_MAX][3] = {{0}}, sh[GN_SH_MAX][3];
+    int width = map->radiance.width, height = map->radiance.height;
+    memset(map->fill, 0, sizeof(map->fill));
+    for (int t = 0; t < width * height; t++) {
+        double d[3] = {(double)map->direction_world[3 * t], (double)map->direction_world[3 * t + 1],
+                       (double)map->direction_world[3 * t + 2]};
+        double w = (double)map->solid_angle[t];
+        for (int l = 0; l <= 4; l++)
+            for (int m = -l; m <= l; m++)
+                for (int c = 0; c < 3; c++)
+                    sum[l * (l + 1) + m][c] += get_harmonic(l, m, d) * w *
+                                               (1 - w * l * (l + 1) / 24) *
+                                               (double)map->radiance.data[3 * t + c];
+    }
+    assert_int_equal(gn_sh_project_map(map, 4, NULL, sh), 0);
+    double worst = 0;
+    for (int k = 0; k < GN_SH_MAX; k++)
+        for (int c = 0; c < 3; c++)
+            worst = fmax(worst, fabs(sh[k][c] - sum[k][c]) / sum[0][c]);
+    print_message("%s %dx%d: off by %.2g of L00\n", gn_projection_get_name(map->projection.type),
+                  width, height, worst);
+    assert_true(worst < 1e-6);
+    gn_radiance_map_unref(&map);
+}
+
+static void floats_round_away_less_than_a_millionth(void **unused)
+{
+    (void)unused;
+    static const struct {
+        enum gn_projection_type type;
+        int width, height;
+    } cases[] = {{GN_PROJECTION_ANGULAR, 301, 301},
+                 {GN_PROJECTION_MIRRORBALL, 128, 128},
+                 {GN_PROJECTION_CUBE, 100, 600},
+                 {GN_PROJECTION_FISHEYE_EQUIDISTANT, 203, 203}};
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        struct light_fixture f;
+        assert_int_equal(light_fixture_init(&f, cases[i].type, cases[i].width, cases[i].height), 0);
+        light_fixture_fill(&f, light_fixture_room);
+        check_rounding(&f);
+        gn_image_at(&f.image, cases[i].width / 3, cases[i].height / 3)[1] = 1e9f; // a sun
+        check_rounding(&f);
+        light_fixture_finish(&f);
+    }
+}
+
+/* Texels are exact boxes: cutting each in four changes nothing but the way they are summed. */
+static void folded_rows_equal_plain_ones(void **unused)
+{
+    (void)unused;
+    double sh[2][GN_SH_MAX][3];
+    for (int i = 0; i < 2; i++) {
+        int parts = i == 0 ? 1 : 4; // 36 columns are summed one by one, 144 four at a time
+        struct light_fixture f;
+        assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 36 * parts, 18), 0);
+        for (int y = 0; y < 18; y++)
+            for (int x = 0; x < 36 * parts; x++)
+                for (int c = 0; c < 3; c++)
+                    gn_image_at(&f.image, x, y)[c] = (float)((x / parts * 7 + y * 5 + c * 3) % 11);
+        for (int x = 0; x < parts; x++) // a sun
+            gn_image_at(&f.image, 20 * parts + x, 7)[1] = 1e9f;
+        f.frame.codes = &f.image;
+        struct gn_radiance_map *map = make_map(&f);
+        assert_int_equal(gn_sh_project_map(map, 4, NULL, sh[i]), 0);
+        gn_radiance_map_unref(&map);
+        light_fixture_finish(&f);
+    }
+    for (int k = 0; k < GN_SH_MAX; k++)
+        for (int c = 0; c < 3; c++)
+            assert_near(sh[0][k][c], sh[1][k][c], 5e-7 * sh[0][0][c]);
+}
+
 static void irradiance_map_holds_clamped_irradiance(void **unused)
 {
     (void)unused;
@@ -371,6 +688,14 @@ int main(void)
         cmocka_unit_test(delta_light_errs_as_known),
         cmocka_unit_test(broad_light_is_within_one_and_a_half_percent),
         cmocka_unit_test(turning_the_probe_turns_the_light),
+        cmocka_unit_test(basis_is_legendre_times_waves),
+        cmocka_unit_test(cosine_factors_are_the_integrals),
+        cmocka_unit_test(points_and_discs_err_as_known),
+        cmocka_unit_test(dering_is_the_smallest_window),
+        cmocka_unit_test(lights_taken_out_are_exact),
+        cmocka_unit_test(lights_follow_the_frames),
+        cmocka_unit_test(folded_rows_equal_plain_ones),
+        cmocka_unit_test(floats_round_away_less_than_a_millionth),
         cmocka_unit_test(irradiance_map_holds_clamped_irradiance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
