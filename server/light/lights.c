@@ -16,7 +16,8 @@
 
 static const double pi = 3.14159265358979323846;
 
-void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel)
+static inline void add_texel(struct gn_patch *patch, const struct gn_radiance_map *map,
+                             uint32_t texel)
 {
     const float *l = map->radiance.data + 3 * (size_t)texel;
     const float *d = map->direction_world + 3 * (size_t)texel;
@@ -36,6 +37,20 @@ void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *ma
     patch->nearness += energy * (double)map->geometry->nearness[texel];
     for (int c = 0; c < 3; c++)
         patch->normal[c] += energy * (double)normal[c];
+}
+
+void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel)
+{
+    add_texel(patch, map, texel);
+}
+
+void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *map,
+                         const uint32_t *texels, size_t n)
+{
+    struct gn_patch sum = *patch; // a copy that nothing else points to stays in registers
+    for (size_t i = 0; i < n; i++)
+        add_texel(&sum, map, texels[i]);
+    *patch = sum;
 }
 
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)
@@ -103,13 +118,13 @@ int gn_light_list_add_fill(struct gn_light_list *list, const struct gn_radiance_
     *out_n = 0;
     for (int i = 0; i < plan->n_fill_cells; i++) {
         const struct gn_fill_cell *cell = &plan->fill_cell[i];
-        struct gn_patch patch = {.energy = luminance * cell->solid_angle};
-        for (int c = 0; c < 3; c++) {
+        struct gn_patch patch = {.energy = cell->solid_angle}; // of luminance 1: the same direction
+        for (int c = 0; c < 3; c++) {                          // to the bit whatever the light
             patch.irradiance[c] = (double)map->fill[c] * cell->solid_angle;
-            patch.toward[c] = luminance * cell->toward[c];
+            patch.toward[c] = cell->toward[c];
         }
         struct gn_light light;
-        if (!gn_patch_get_light(&patch, &light))
+        if (!(luminance > 0) || !gn_patch_get_light(&patch, &light))
             continue;
         light.id = GN_LIGHT_ID_FILL | (uint64_t)i;
         int rc = gn_light_list_add(list, &light);
@@ -126,17 +141,26 @@ void gn_light_list_finish(struct gn_light_list *list)
     *list = (struct gn_light_list){0};
 }
 
-double gn_light_memory_follow(const struct gn_light_input *input, double kept, double fresh,
-                              double count_ratio)
+bool gn_light_is_count_kept(double count_ratio)
+{
+    return count_ratio >= 0.75 && count_ratio <= 1.25;
+}
+
+double gn_light_get_share(const struct gn_light_input *input)
 {
     static const double time_constant_s = 1;
+    int64_t ns = input->map->capture_time_ns - input->previous->map->capture_time_ns;
+    return ns > 0 ? -expm1(-(double)ns / (double)GN_NS_PER_S / time_constant_s) : 0;
+}
+
+double gn_light_follow(const struct gn_light_input *input, double kept, double fresh,
+                       double count_ratio)
+{
     if (!(fresh < 4 * kept && kept < 4 * fresh))
         return fresh;
-    if (count_ratio >= 0.75 && count_ratio <= 1.25)
+    if (gn_light_is_count_kept(count_ratio))
         return kept;
-    int64_t ns = input->map->capture_time_ns - input->previous->map->capture_time_ns;
-    double share = ns > 0 ? -expm1(-(double)ns / (double)GN_NS_PER_S / time_constant_s) : 0;
-    return kept * pow(fresh / kept, share);
+    return kept * pow(fresh / kept, gn_light_get_share(input));
 }
 
 struct gn_light_memory *gn_light_memory_ref(struct gn_light_memory *memory)

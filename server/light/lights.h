@@ -30,6 +30,9 @@ struct gn_patch {
 
 /** Adds one texel of the map. */
 void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel);
+/** Adds n texels, in order: the same sums to the bit. */
+void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *map,
+                         const uint32_t *texels, size_t n);
 /** Adds another patch. */
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other);
 /**
@@ -90,15 +93,22 @@ struct gn_light_memory {
     uint64_t *marks;           // [n_marks], owned
     struct gn_grid_plan *grid; // shared (ref), may be NULL: fits any settings
 };
-/**
- * The light's unit of a stream, against which counts are made: kept from frame to frame, so that
- * what changes in one place changes lights there only. It follows when it no longer fits: by an
- * exponential of time constant 1 s while the number of lights it gives, over the number wanted,
- * lies outside [3/4, 5/4], and at once where kept and fresh differ by more than a factor of 4.
- * count_ratio: that number with the kept unit. Returns the unit to use.
+/*
+ * What lights are counted against, the power of a sample or the luminance of a light, is kept from
+ * frame to frame, so that what changes in one place changes lights there only. It follows when it
+ * no longer fits, by an exponential of time constant 1 s, and at once where it is off by more than
+ * a factor of 4.
  */
-double gn_light_memory_follow(const struct gn_light_input *input, double kept, double fresh,
-                              double count_ratio);
+
+/** Whether it fits: count_ratio, lights met over lights wanted, lies in [3/4, 5/4]. */
+bool gn_light_is_count_kept(double count_ratio);
+/** How much of the way to the new it goes in the time since the last frame: [0, 1). */
+double gn_light_get_share(const struct gn_light_input *input);
+/** The unit to use, of the one kept and the one that fits this frame. */
+double gn_light_follow(const struct gn_light_input *input, double kept, double fresh,
+                       double count_ratio);
+
+/** Both share it. */
 struct gn_light_memory *gn_light_memory_ref(struct gn_light_memory *memory);
 /** Drops a reference. NULL-safe; nulls *memory. */
 void gn_light_memory_unref(struct gn_light_memory **memory);

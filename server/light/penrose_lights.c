@@ -26,7 +26,7 @@ static int draw(const struct gn_light_input *input, int n_wanted, struct gn_map_
     if (remembered && remembered->figure[POWER] > 0 && !sampling.is_plain) {
         double fresh = map->figures.mean_luminance * map->figures.shown_solid_angle / n_wanted;
         double kept = remembered->figure[POWER];
-        sampling.power = gn_light_memory_follow(input, kept, fresh, fresh / kept);
+        sampling.power = gn_light_follow(input, kept, fresh, fresh / kept);
         sampling.kept = remembered->marks;
         sampling.n_kept = remembered->n_marks;
     }
@@ -59,8 +59,8 @@ static int add_whole(const struct gn_light_input *input, struct gn_light_list *l
 {
     struct gn_patch patch = {0};
     struct gn_light light;
-    for (uint32_t i = 0; i < input->plan->start[input->plan->n_regions]; i++)
-        gn_patch_add_texel(&patch, input->map, input->plan->texel[i]);
+    gn_patch_add_texels(&patch, input->map, input->plan->texel,
+                        input->plan->start[input->plan->n_regions]);
     if (!gn_patch_get_light(&patch, &light))
         return 0;
     light.id = GN_PENROSE_LIGHT_ID;

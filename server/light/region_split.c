@@ -86,7 +86,7 @@ static int partition(struct gn_split_item *items, int n, int axis, double cut)
 
 /* axis -1: the longer side. */
 static void split(const struct splitter *s, struct gn_split_item *items, int n,
-                  const struct gn_polar_box *box, int64_t n_parts, int axis)
+                  const struct gn_polar_box *box, int64_t n_parts, int axis, uint64_t path)
 {
     if (n == 0)
         return;
@@ -103,7 +103,7 @@ static void split(const struct splitter *s, struct gn_split_item *items, int n,
         is_cut = find_cut(items, n, along, box, share, &cut);
     }
     if (!is_cut) {
-        s->part(s->context, items, n);
+        s->part(s->context, items, n, path);
         return;
     }
     int n_below = partition(items, n, along, cut);
@@ -113,8 +113,8 @@ static void split(const struct splitter *s, struct gn_split_item *items, int n,
         n_first = n_first > n_below ? n_below : n_first;
         n_first = n_parts - n_first > n - n_below ? n_parts - (n - n_below) : n_first;
     }
-    split(s, items, n_below, &below, n_first, axis);
-    split(s, items + n_below, n - n_below, &above, n_parts - n_first, axis);
+    split(s, items, n_below, &below, n_first, axis, 2 * path);
+    split(s, items + n_below, n - n_below, &above, n_parts - n_first, axis, 2 * path + 1);
 }
 
 void gn_region_split(struct gn_split_item *items, int n, const struct gn_polar_box *box,
@@ -122,20 +122,20 @@ void gn_region_split(struct gn_split_item *items, int n, const struct gn_polar_b
 {
     struct splitter s = {options->is_midpoint, part, context};
     if (!options->is_two_strips || options->n_parts < 4) {
-        split(&s, items, n, box, options->n_parts, -1);
+        split(&s, items, n, box, options->n_parts, -1, 1);
         return;
     }
     int axis = get_longer_axis(box);
     double cut = 0.5 * (box->low[axis] + box->high[axis]);
     if (!options->is_midpoint && !find_cut(items, n, axis, box, 0.5, &cut)) {
-        split(&s, items, n, box, options->n_parts, -1);
+        split(&s, items, n, box, options->n_parts, -1, 1);
         return;
     }
     int n_below = partition(items, n, axis, cut);
     struct gn_polar_box half[2] = {*box, *box};
     half[0].high[axis] = half[1].low[axis] = cut;
     int64_t n_first = options->n_parts / 2;
-    split(&s, items, n_below, &half[0], n_first, get_longer_axis(&half[0]));
+    split(&s, items, n_below, &half[0], n_first, get_longer_axis(&half[0]), 2);
     split(&s, items + n_below, n - n_below, &half[1], options->n_parts - n_first,
-          get_longer_axis(&half[1]));
+          get_longer_axis(&half[1]), 3);
 }

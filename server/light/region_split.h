@@ -25,8 +25,9 @@ struct gn_split_options {
     bool is_two_strips; // halve once, then strips of each half; else halve again and again
 };
 
-/** Takes one part that is not empty. */
-typedef void (*gn_split_part_fn)(void *context, const struct gn_split_item *items, int n);
+/** Takes one part that is not empty. path: a leading 1, then a bit for each cut, 1: above it. */
+typedef void (*gn_split_part_fn)(void *context, const struct gn_split_item *items, int n,
+                                 uint64_t path);
 
 /** Reorders items. Calls part at most min(n_parts, n) times, in a fixed order. */
 void gn_region_split(struct gn_split_item *items, int n, const struct gn_polar_box *box,

@@ -1,0 +1,61 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What partition.c (sums, samples, lights) and partition_count.c (how many lights each region gets)
+ * share. Not for others.
+ */
+#ifndef GN_SERVER_LIGHT_PARTITION_INTERNAL_H
+#define GN_SERVER_LIGHT_PARTITION_INTERNAL_H
+
+#include "server/light/map_samples.h"
+#include "server/light/method.h"
+#include "server/light/region_split.h"
+
+/** One base region. */
+struct gn_region {
+    struct gn_patch patch; // its texels
+    double mean;           // MLR
+    double log_mean;       // log2 of it
+    bool is_bright;
+    int64_t n_parts; // lights wanted, 0 or more
+    int n_items;     // what can be told apart in it: lit texels, or samples
+    int first_slot;  // of its lights
+    int n_slots;
+};
+
+/** One map's partition on the way. */
+struct gn_partition {
+    const struct gn_light_input *input;
+    const struct gn_radiance_map *map;
+    const struct gn_light_settings *settings;
+    const struct gn_partition_plan *plan;
+    struct gn_region *regions; // [n_regions]
+    struct gn_patch *cells;    // [n_dark_cells] what bright regions leave
+    bool needs_samples;
+    struct gn_map_samples samples;
+    uint32_t *sample_start;      // [n_regions + 1] into sample_items
+    struct gn_split_item *items; // texels in the plan's order, or samples by region
+    double mean;                 // MLEM, of this map; after counting the one measured against
+    double log_unit;             // log2 of the luminance of one light, after counting
+    const uint64_t *marks;       // of the last frame, where it decided; or NULL
+    double max;                  // maxLumiEM, for the linear metrics
+    struct gn_light *slots;
+    bool *is_lit; // of slots
+};
+
+static inline bool gn_partition_is_literal(const struct gn_partition *p, unsigned reading)
+{
+    return (p->settings->literal & reading) != 0;
+}
+
+/**
+ * Decides which regions are bright and how many parts each is cut into: regions' is_bright and
+ * n_parts, the cells. In a stream decisions have hysteresis: what they are measured against is kept
+ * while the number of lights fits, and each stays while it is within 5 %. The linear metrics, whose
+ * number cannot be asked for, decide anew in each frame.
+ */
+void gn_partition_count_lights(struct gn_partition *p, struct gn_light_figures *figures);
+/** What the next frame is to know. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_partition_remember(const struct gn_partition *p, struct gn_light_memory *memory);
+
+#endif
