@@ -341,6 +341,41 @@ int gn_emitters_set_picture(struct gn_emitters *emitters, int stream,
     return 0;
 }
 
+int gn_emitters_take_pictures(struct gn_emitters *emitters, const struct gn_emission *from)
+{
+    bool is_same = true;
+    if (!emitters->emission)
+        return 0;
+    for (int i = 0; i < from->n_objects; i++)
+        is_same &= from->pictures[i] == emitters->emission->pictures[i];
+    if (is_same)
+        return 0;
+    struct gn_emission *next = create_emission(emitters);
+    int ret = next ? 0 : -ENOMEM;
+    for (int i = 0; i < from->n_objects && ret == 0; i++) {
+        struct gn_emission_picture *picture = from->pictures[i];
+        if (picture == next->pictures[i])
+            continue;
+        gn_emission_picture_unref(&next->pictures[i]);
+        next->pictures[i] = picture;
+        if (picture)
+            atomic_fetch_add_explicit(&picture->references, 1, memory_order_relaxed);
+        ret = fill_object(emitters, (uint32_t)i, picture ? &picture->image : NULL, next->lights);
+    }
+    if (ret < 0) {
+        gn_emission_unref(&next);
+        return ret;
+    }
+    gn_emission_unref(&emitters->emission);
+    emitters->emission = next;
+    return 0;
+}
+
+const struct gn_pieces *gn_emitters_get_pieces(const struct gn_emitters *emitters)
+{
+    return &emitters->pieces;
+}
+
 struct gn_emission *gn_emitters_get_emission(const struct gn_emitters *emitters)
 {
     return emitters->emission ? gn_emission_ref(emitters->emission) : NULL;

@@ -69,6 +69,8 @@ struct gn_emitter_options {
                   // up to 6 in any case
 };
 
+struct gn_pieces; // server/light/pieces.h
+
 /** The emitters of a scene and their pictures. Thread-safety: unsafe. */
 struct gn_emitters;
 
@@ -99,6 +101,14 @@ int gn_emitters_find_stream(const struct gn_emitters *emitters, const char *name
 GN_MUST_USE int gn_emitters_set_picture(struct gn_emitters *emitters, int stream,
                                         const struct gn_image *linear_rgb,
                                         struct gn_error *out_error);
+
+/** Lays the pictures of another division of the same scene over this one's meshes; shares them.
+ * Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_emitters_take_pictures(struct gn_emitters *emitters,
+                                          const struct gn_emission *from);
+
+/** The pieces, in the order of the emission's lights after the scene's. Borrowed. */
+const struct gn_pieces *gn_emitters_get_pieces(const struct gn_emitters *emitters);
 
 /** What the emitters send now: the caller's reference, or NULL where the scene has no near light.
  */

@@ -37,3 +37,32 @@ int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static M
     }
     return n;
 }
+
+/** True where the box lies under the planes through all wanted receivers' ray origins: no ray that
+ * leaves upwards meets it. */
+static bool is_box_under(const struct receivers *r, const struct box *box)
+{
+    for (int j = 0; j < r->n; j++) {
+        if (!(r->wanted[j / LANES] >> (j % LANES) & 1))
+            continue;
+        double highest = 0;
+        for (int k = 0; k < 3; k++) {
+            double n = r->geometric[k][j];
+            highest += n * ((double)(n > 0 ? box->max[k] : box->min[k]) - r->org[k][j]);
+        }
+        if (highest > 0)
+            return false;
+    }
+    return true;
+}
+
+int gn_blockers_list_above(const struct frame *frame, const struct receivers *receivers,
+                           const struct box *out_boxes[static MAX_BLOCKERS])
+{
+    int n = 0;
+    for (int i = 0; i < frame->n_blockers; i++) {
+        if (!is_box_under(receivers, &frame->blockers[i]))
+            out_boxes[n++] = &frame->wide_blockers[i];
+    }
+    return n;
+}

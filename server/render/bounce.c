@@ -89,6 +89,8 @@ static void try_light(const struct frame *frame, const struct walk *walk, enum g
                       uint64_t *random, double sums[static 2][3], uint64_t *rays)
 {
     const struct light_list *lights = frame->lights;
+    if (lights->n_lit == 0)
+        return;
     int l = choose_light(lights, next_unit(random));
     double probability = lights->cdf[l] - (l > 0 ? lights->cdf[l - 1] : 0);
     const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
@@ -107,6 +109,23 @@ static void try_light(const struct frame *frame, const struct walk *walk, enum g
     for (int k = 0; k < 3; k++)
         radiance[k] = walk->surface.albedo[k] / M_PI * c * lights->irradiance[k][l] / probability;
     add_radiance(walk, radiance, sums);
+}
+
+/** Near light at the walk's vertex, by one lamp or piece. Direct light of emissive surfaces is all
+ * in this: a walk that runs into one takes nothing, unless it came from a mirror. */
+static void try_near(const struct frame *frame, struct walk *walk, enum gn_rt_set set,
+                     uint64_t *random, double sums[static 2][3], uint64_t *rays)
+{
+    double irradiance[3];
+    enum gn_rt_set role;
+    bool was_touched = walk->is_touched;
+    gn_near_reference_try(frame, &walk->surface, walk->org, set, next_random(random), irradiance,
+                          &role, rays);
+    for (int k = 0; k < 3; k++)
+        irradiance[k] *= walk->surface.albedo[k] / M_PI;
+    walk->is_touched |= role == GN_RT_VIRTUAL;
+    add_radiance(walk, irradiance, sums);
+    walk->is_touched = was_touched;
 }
 
 /** The next vertex. False where the walk ends. */
@@ -129,6 +148,11 @@ static bool step(const struct frame *frame, struct walk *walk, enum gn_rt_set se
     gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
                         surface->normal_geometric, walk->org);
     walk->is_touched |= surface->role == GN_RT_VIRTUAL;
+    if (walk->is_specular) {
+        double radiance[3];
+        gn_near_get_emission(frame, surface, radiance);
+        add_radiance(walk, radiance, sums);
+    }
     walk->is_specular = surface->material == GN_MATERIAL_MIRROR;
     return true;
 }
@@ -158,6 +182,8 @@ static void take_walk(const struct frame *frame, const struct sample *start, enu
             return;
         if (!walk.is_specular)
             try_light(frame, &walk, set, &random, sums, rays);
+        if (!walk.is_specular && frame->near.cdf)
+            try_near(frame, &walk, set, &random, sums, rays);
     }
 }
 

@@ -11,6 +11,7 @@
 #define GN_SERVER_RENDER_INTERNAL_H
 
 #include "server/light/blend.h"
+#include "server/render/near.h"
 #include "server/render/render.h"
 
 /** Side of a tile, px. */
@@ -181,6 +182,8 @@ struct scratch {
     struct receivers receivers;
     uint16_t cut[BATCH / LANES][GN_LIGHTS_MAX];    // per block and light, bit i: virtual objects
     uint16_t hidden[BATCH / LANES][GN_LIGHTS_MAX]; // (real objects) hide it from lane i
+    uint16_t near_cut[BATCH / LANES][GN_NEAR_LIGHTS_MAX]; // the same of near lights
+    uint16_t near_hidden[BATCH / LANES][GN_NEAR_LIGHTS_MAX];
     struct gn_rt_packet packet;
     int lane_sample[GN_RT_PACKET];
     int lane_light[GN_RT_PACKET];
@@ -200,6 +203,7 @@ struct tile_figures {
     double s_primary, s_shade, s_shadow;
     uint64_t rays_primary, rays_mirror, rays_shade, rays_shadow;
     uint64_t n_mirrors, n_lit, n_receivers, n_rays_real;
+    uint64_t n_near; // near lights that reach a sample
     double error_sum;
     int64_t error_n;
     int64_t n_virtual_pixels, n_shadow_pixels, n_refined_pixels;
@@ -224,6 +228,7 @@ struct frame {
     const struct clusters *clusters; // [2]: real, virtual
     float margin;                    // m, by which boxes are widened
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
+    struct near_lights near;         // of the state; reference: finer
     double floor_irradiance[3];      // sums up to this are no light (1e-6 of all)
     float floor_radiance;            // radiances below this do not make contrast
 
@@ -293,6 +298,10 @@ void gn_shadow_clear(struct sample *sample);
 
 /** Boxes of the real objects, each in one. Returns their number. */
 int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static MAX_BLOCKERS]);
+/** Those of the frame's (widened) that do not lie wholly under the planes through all wanted
+ * receivers' ray origins: no ray that leaves upwards meets the others. Returns their number. */
+int gn_blockers_list_above(const struct frame *frame, const struct receivers *receivers,
+                           const struct box *out_boxes[static MAX_BLOCKERS]);
 
 /* clusters.c */
 
@@ -379,9 +388,10 @@ void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, i
 
 /* packet.c: rays into packets of 16 */
 
-/** Adds a ray; true where the packet is now full and must be flushed by the caller. */
+/** Adds a ray of that length (INFINITY: to a distant light); true where the packet is now full and
+ * must be flushed by the caller. */
 bool gn_packet_add(struct scratch *scratch, const float org[static 3], const float dir[static 3],
-                   int sample, int light, float weight);
+                   int sample, int light, float weight, float length);
 /** Traces what the packet holds and empties it; bit i: lane i is hidden. *out_n: lanes. */
 uint32_t gn_packet_trace(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
                          int *out_n, uint64_t *rays);

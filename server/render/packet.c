@@ -5,7 +5,7 @@
 #include <math.h>
 
 bool gn_packet_add(struct scratch *scratch, const float org[static 3], const float dir[static 3],
-                   int sample, int light, float weight)
+                   int sample, int light, float weight, float length)
 {
     struct gn_rt_packet *packet = &scratch->packet;
     int i = scratch->n_lanes++;
@@ -16,7 +16,7 @@ bool gn_packet_add(struct scratch *scratch, const float org[static 3], const flo
     packet->dir_y[i] = dir[1];
     packet->dir_z[i] = dir[2];
     packet->t_near[i] = 0;
-    packet->t_far[i] = INFINITY;
+    packet->t_far[i] = length;
     packet->valid[i] = -1;
     scratch->lane_sample[i] = sample;
     scratch->lane_light[i] = light;

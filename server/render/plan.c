@@ -5,11 +5,11 @@
 #include <math.h>
 
 /** The plan's lines, in the order of the passes. */
-enum line { PRIMARY, REFINE, SHADE, MIRROR, SHADOW, BLOCKERS, ADDED, N_LINES };
+enum line { PRIMARY, REFINE, SHADE, MIRROR, SHADOW, BLOCKERS, NEAR, ADDED, N_LINES };
 
 static const char *const pass_names[N_LINES] = {
     [PRIMARY] = "primary", [REFINE] = "refine",     [SHADE] = "shade", [MIRROR] = "mirror",
-    [SHADOW] = "shadow",   [BLOCKERS] = "blockers", [ADDED] = "added",
+    [SHADOW] = "shadow",   [BLOCKERS] = "blockers", [NEAR] = "near",   [ADDED] = "added",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -59,7 +59,7 @@ static bool can_any_light_cast(const struct frame *frame)
         if (!is_dark && gn_box_may_meet_from_box(&frame->virtual_box, &frame->real_box, dir))
             return true;
     }
-    return false;
+    return gn_near_can_cast(frame);
 }
 
 static bool is_real_flat(const struct frame *frame)
@@ -94,6 +94,8 @@ static const char *why_not_virtual(const struct frame *frame, const double slope
 static const char *why_not_light_loop(const struct frame *frame)
 {
     const struct gn_render_options *options = &frame->options;
+    if (frame->near.n > 0)
+        return NULL;
     if (options->shading == GN_SHADING_IRRADIANCE && options->quality != GN_QUALITY_REFERENCE)
         return "irradiance shading needs no loop over lights";
     if (frame->lights->n == 0)
@@ -107,7 +109,7 @@ static const char *why_not_shadow(const struct frame *frame)
         return "the scene has no virtual object";
     if (!frame->has_real)
         return "the scene has no real object to receive one";
-    if (frame->lights->n == 0)
+    if (frame->lights->n == 0 && frame->near.n == 0)
         return "no light";
     if (!frame->run_bounces && !can_any_light_cast(frame))
         return "no light throws a shadow of a virtual object onto a real one";
@@ -121,6 +123,22 @@ static const char *why_not_blockers(const struct frame *frame)
     if (!frame->options.all_passes && is_real_flat(frame))
         return "the real geometry is one plane: it hides no light from itself";
     return NULL;
+}
+
+static const char *why_not_near(const struct frame *frame, const char *no_virtual,
+                                const char *no_shadow)
+{
+    if (!frame->blend.state[0]->emission && frame->near.n == 0)
+        return "no lamp and no emissive mesh in the scene";
+    if (frame->near.n == 0)
+        return "every lamp and emissive mesh is dark";
+    return no_virtual && no_shadow ? no_shadow : NULL;
+}
+
+static const char *why_added(const struct frame *frame)
+{
+    return frame->near.n_virtual > 0 ? "light of virtual lamps and screens on real surfaces"
+                                     : "light that virtual objects send to real ones";
 }
 
 void gn_plan_make(struct frame *frame, const double slopes[static 4],
@@ -154,10 +172,13 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     set_line(report, SHADOW, no_shadow, "virtual objects may hide light from real ones");
     set_line(report, BLOCKERS, no_shadow ? no_shadow : no_blockers,
              "real objects may hide light from real ones");
+    set_line(report, NEAR, why_not_near(frame, no_virtual, no_shadow),
+             "lamps and emissive meshes are tried from each surface");
+    bool can_add = frame->run_bounces || frame->near.n_virtual > 0;
     set_line(report, ADDED,
-             !frame->run_bounces ? "0 bounces: nothing is added; caustics of mirrors are not built"
-                                 : no_shadow,
-             "light that virtual objects send to real ones");
+             !can_add ? "0 bounces: nothing is added; caustics of mirrors are not built"
+                      : no_shadow,
+             why_added(frame));
 }
 
 /** The pass was ready to run and found no work. */
@@ -178,6 +199,8 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
     withdraw(report, BLOCKERS, sum->n_receivers == 0, "no diffuse real surface in view");
     withdraw(report, SHADOW, sum->n_receivers == 0, "no diffuse real surface in view");
     withdraw(report, BLOCKERS, sum->n_rays_real == 0, "no pixel loses light to a virtual object");
+    withdraw(report, NEAR, sum->n_near == 0,
+             "no near light reaches a virtual surface, or a real one by way of a virtual object");
     withdraw(report, SHADOW, sum->rays_shadow == 0,
              "no light's ray from a pixel comes near a virtual object");
     withdraw(report, ADDED, sum->n_receivers == 0, "no diffuse real surface in view");

@@ -342,6 +342,9 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
             s->radiance[k] =
                 s->through[k] * (s->surface.albedo[k] / M_PI * sums[0][k]) + s->indirect[k];
         }
+        gn_near_add_emission(frame, s);
+        if (frame->near.n > 0)
+            gn_near_reference_shade(frame, s, figures);
     }
 }
 
@@ -374,6 +377,8 @@ static void sum_receiver(const struct frame *frame, struct scratch *scratch, str
     sum_lights(frame, scratch, s, frame->options.shadow_unweighted, sums);
     figures->rays_shadow += rays;
     figures->n_rays_real += rays;
+    if (frame->near.n > 0)
+        gn_near_reference_sum(frame, s, frame->options.shadow_unweighted, sums, figures);
     memcpy(s->open[0], sums[0], sizeof(sums[0]));
     memcpy(s->cut[0], sums[1], sizeof(sums[1]));
     gn_shadow_weigh(frame, s);
@@ -393,6 +398,8 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
             continue;
         s->is_cut = find_hidden(frame, scratch, s, GN_RT_VIRTUAL, scratch->cut_texels,
                                 &figures->rays_shadow);
+        if (!s->is_cut && frame->near.n_real > 0)
+            s->is_cut = gn_near_reference_is_cut(frame, s, figures);
         if (s->is_cut || frame->run_bounces)
             sum_receiver(frame, scratch, s, n_paths, figures);
     }
@@ -407,5 +414,9 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
             sum_receiver(frame, scratch, s, n_paths, figures);
         else
             gn_shadow_see_nothing(frame, s);
+    }
+    for (int i = 0; i < n && frame->near.n_virtual > 0; i++) {
+        if (scratch->samples[i].is_receiver)
+            gn_near_reference_gain(frame, &scratch->samples[i], figures);
     }
 }

@@ -24,6 +24,7 @@ struct gn_renderer {
     int n_workers;
     struct scratch *scratches; // [n_workers], owned
     struct light_list lights;
+    struct near_store near;
     size_t n_pixels; // capacity of what follows
     float *rays;     // [h][w][3], owned
     struct feature *features;
@@ -78,6 +79,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     for (int i = 0; i < 2; i++)
         gn_clusters_finish(&self->clusters[i]);
     gn_render_lights_finish(&self->lights);
+    gn_near_store_finish(&self->near);
     free(self->rays);
     free(self->features);
     free(self->figures);
@@ -195,6 +197,8 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
         gn_reference_shade(frame, scratch, n, n_paths, figures);
     else
         gn_shade_samples(frame, scratch, n, figures);
+    if (!is_reference && frame->near.n > 0)
+        gn_near_shade(frame, scratch, n, figures);
     int64_t t2 = gn_clock_get_monotonic_ns();
     if (!frame->run_shadow) {
         for (int i = 0; i < n; i++)
@@ -438,6 +442,7 @@ static void sum_figures(const struct frame *frame, struct tile_figures *sum)
         sum->rays_shade += f->rays_shade;
         sum->rays_shadow += f->rays_shadow;
         sum->n_mirrors += f->n_mirrors;
+        sum->n_near += f->n_near;
         sum->n_lit += f->n_lit;
         sum->n_receivers += f->n_receivers;
         sum->n_rays_real += f->n_rays_real;
@@ -461,7 +466,7 @@ static void fill_report(const struct frame *frame, int n_workers, struct gn_rend
     report->rays_mirror = sum.rays_mirror;
     report->rays_shade = sum.rays_shade;
     report->rays_shadow = sum.rays_shadow;
-    report->n_lights = frame->lights->n_lit;
+    report->n_lights = frame->lights->n_lit + frame->near.n;
     report->n_virtual_pixels = sum.n_virtual_pixels;
     report->n_shadow_pixels = sum.n_shadow_pixels;
     report->n_refined_pixels = sum.n_refined_pixels;
@@ -515,6 +520,10 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
     if (ret < 0)
         return ret;
 
+    bool is_reference = options->quality == GN_QUALITY_REFERENCE;
+    ret = gn_near_prepare(&renderer->near, renderer->scene, light, is_reference, &frame.near);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
     init_frame(&frame, renderer);
     gn_plan_make(&frame, renderer->slopes, &report);
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);

@@ -114,6 +114,7 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
             continue;
+        gn_near_add_emission(frame, s);
         if (frame->options.shading == GN_SHADING_IRRADIANCE)
             shade_by_irradiance(frame, s);
         else
@@ -133,7 +134,7 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
             float c = surface_cosine(&s->surface, dir);
             if (frame->blend.n > 1)
                 c *= s->weights[probe];
-            if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c))
+            if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c, INFINITY))
                 flush(frame, scratch, irradiance, figures);
         }
     }

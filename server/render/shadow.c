@@ -113,7 +113,7 @@ static void trace_block(const struct frame *frame, struct scratch *scratch, int 
             continue;
         if (frame->cull && set == GN_RT_VIRTUAL && !gn_box_may_meet(&frame->virtual_box, org, dir))
             continue;
-        if (gn_packet_add(scratch, org, dir, j, light, 0))
+        if (gn_packet_add(scratch, org, dir, j, light, 0, INFINITY))
             flush(frame, scratch, set, masks, figures);
     }
 }
@@ -146,24 +146,6 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
     }
 }
 
-/** True where the box lies under the planes through all wanted receivers' ray origins: no ray that
- * leaves upwards meets it. */
-static bool is_box_under(const struct receivers *r, const struct box *box)
-{
-    for (int j = 0; j < r->n; j++) {
-        if (!(r->wanted[j / LANES] >> (j % LANES) & 1))
-            continue;
-        double highest = 0;
-        for (int k = 0; k < 3; k++) {
-            double n = r->geometric[k][j];
-            highest += n * ((double)(n > 0 ? box->max[k] : box->min[k]) - r->org[k][j]);
-        }
-        if (highest > 0)
-            return false;
-    }
-    return true;
-}
-
 /** Which lights do real objects hide from the wanted receivers? */
 static void find_hidden(const struct frame *frame, struct scratch *scratch,
                         struct tile_figures *figures)
@@ -171,11 +153,7 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
     const struct box *boxes[MAX_BLOCKERS];
-    int n_boxes = 0;
-    for (int i = 0; i < frame->n_blockers && frame->cull; i++) {
-        if (!is_box_under(r, &frame->blockers[i]))
-            boxes[n_boxes++] = &frame->wide_blockers[i];
-    }
+    int n_boxes = frame->cull ? gn_blockers_list_above(frame, r, boxes) : 0;
     for (int l = 0; l < lights->n; l++) {
         const struct box *near[MAX_BLOCKERS];
         int n_near = 0;
@@ -250,12 +228,14 @@ void gn_shadow_find_groups(const struct frame *frame, const struct sample *sampl
 
 void gn_shadow_weigh(const struct frame *frame, struct sample *s)
 {
+    double emitted[3];
+    gn_near_get_emission(frame, &s->surface, emitted);
     for (int k = 0; k < 3; k++) {
         double u = s->open[0][k] + s->open[1][k];
         double cut = s->cut[0][k] + s->cut[1][k];
         // The ratio does not know the albedo, so a black one may not make it 0 / 0.
         double brdf = fmax(s->surface.albedo[k], 1e-3) / M_PI;
-        s->base[k] = brdf * u;
+        s->base[k] = brdf * u + emitted[k];
         s->lost[k] = u > frame->floor_irradiance[k] ? brdf * cut : 0;
     }
 }
@@ -294,6 +274,8 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         r->wanted[b] = 0;
     }
     find_cut(frame, scratch, figures);
+    if (frame->near.n > 0)
+        gn_near_find_cut(frame, scratch, figures);
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
     bool is_any_wanted = false;
     for (int j = 0; j < r->n; j++) {
@@ -309,6 +291,8 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         if (r->wanted[b])
             sum_block(frame, scratch, b);
     }
+    if (frame->near.n > 0)
+        gn_near_sum(frame, scratch, figures);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (groups[s->group] && s->is_receiver)
