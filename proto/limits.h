@@ -18,10 +18,13 @@
 #define GN_LIMIT_ENVIRONMENT_BYTES (64u << 20)
 #define GN_LIMIT_FRAME_BYTES (32u << 20)
 #define GN_LIMIT_RESULT_BYTES (32u << 20)
+#define GN_LIMIT_EMITTER_BYTES (24u << 20)
 #define GN_LIMIT_LIGHTING_BYTES (16u << 20)
 
 /** Pixels: longest side of any picture or environment frame. A server may grant less in WELCOME. */
 #define GN_LIMIT_SIDE_PX 8192
+/** Pixels: longest side of an emitter's picture. */
+#define GN_LIMIT_EMITTER_SIDE_PX 2048
 /** Lighting states: lights, bytes of a light's record in the payload, longest sides of the map. */
 #define GN_LIMIT_LIGHTS 16384
 #define GN_LIGHT_RECORD_BYTES 32

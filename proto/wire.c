@@ -27,6 +27,7 @@
     X(POSE, pose, TO_SERVER, 1024, 0)                                                              \
     X(CAMERA, camera, TO_SERVER, 1024, 0)                                                          \
     X(FRAME, frame, TO_SERVER, 4096, GN_LIMIT_FRAME_BYTES)                                         \
+    X(EMITTER_FRAME, emitter_frame, TO_SERVER, 1024, GN_LIMIT_EMITTER_BYTES)                       \
     X(RESULT, result, TO_CLIENT, GN_LIMIT_HEADER_BYTES, GN_LIMIT_RESULT_BYTES)                     \
     X(DROPPED, dropped, TO_CLIENT, 1024, 0)                                                        \
     X(LIGHTING_STATE, lighting_state, TO_CLIENT, 2048, GN_LIMIT_LIGHTING_BYTES)                    \

@@ -30,6 +30,7 @@ enum gn_wire_type {
     GN_WIRE_POSE = 17,
     GN_WIRE_CAMERA = 18,
     GN_WIRE_FRAME = 19,
+    GN_WIRE_EMITTER_FRAME = 20,
     GN_WIRE_RESULT = 32,
     GN_WIRE_DROPPED = 33,
     GN_WIRE_LIGHTING_STATE = 34,
@@ -67,6 +68,7 @@ union gn_wire_message {
     struct gn_msg_pose pose;
     struct gn_msg_camera camera;
     struct gn_msg_frame frame;
+    struct gn_msg_emitter_frame emitter_frame;
     struct gn_msg_result result;
     struct gn_msg_dropped dropped;
     struct gn_msg_lighting_state lighting_state;

@@ -151,6 +151,35 @@ static int check_environment(const struct gn_msg_environment_frame *m, uint32_t 
     return err ? err : check_environment_pixels(m, payload_bytes, fault);
 }
 
+static int check_emitter(const struct gn_msg_emitter_frame *m, uint32_t payload_bytes,
+                         struct gn_wire_fault *fault)
+{
+    if (!m->stream[0])
+        return gn_wire_refuse(fault, "EMITTER_FRAME.stream: missing");
+    if (m->sequence == 0)
+        return gn_wire_refuse(fault, "EMITTER_FRAME.sequence: 0, the first is 1");
+    if (m->width < 1 || m->width > GN_LIMIT_EMITTER_SIDE_PX || m->height < 1 ||
+        m->height > GN_LIMIT_EMITTER_SIDE_PX)
+        return gn_wire_refuse(fault, "EMITTER_FRAME: %u x %u px, sides must be in [1, %d]",
+                              m->width, m->height, GN_LIMIT_EMITTER_SIDE_PX);
+    if (m->pixel_format != GN_MSG_PIXEL_FORMAT_RGB8 &&
+        m->pixel_format != GN_MSG_PIXEL_FORMAT_JPEG &&
+        m->pixel_format != GN_MSG_PIXEL_FORMAT_RGB_F16)
+        return gn_wire_refuse(fault,
+                              "EMITTER_FRAME.pixel_format: %d, only RGB8, JPEG and RGB_F16 are "
+                              "right",
+                              (int)m->pixel_format);
+    uint64_t want = (uint64_t)m->width * m->height * gn_wire_get_pixel_bytes(m->pixel_format);
+    if (want > 0 ? payload_bytes != want : payload_bytes == 0)
+        return gn_wire_refuse(fault, "EMITTER_FRAME: payload of %u bytes, %u x %u px need %llu%s",
+                              payload_bytes, m->width, m->height, (unsigned long long)want,
+                              want > 0 ? "" : " and more: a JPEG file");
+    if (m->scale < 0 || m->scale > MAX_SCALE)
+        return gn_wire_refuse(fault, "EMITTER_FRAME.scale: %g, must be in [0, 1e12]", m->scale);
+    return m->has_response ? check_response(&m->response, false, "EMITTER_FRAME.response", fault)
+                           : 0;
+}
+
 static int check_pose(const struct gn_msg_pose *m, struct gn_wire_fault *fault)
 {
     if (!m->has_world_from_object)
@@ -337,6 +366,8 @@ int gn_wire_check(uint16_t type, const void *msg, uint32_t payload_bytes,
         return check_redirect(msg, fault);
     case GN_WIRE_ENVIRONMENT_FRAME:
         return check_environment(msg, payload_bytes, fault);
+    case GN_WIRE_EMITTER_FRAME:
+        return check_emitter(msg, payload_bytes, fault);
     case GN_WIRE_POSE:
         return check_pose(msg, fault);
     case GN_WIRE_CAMERA:
@@ -384,6 +415,15 @@ static double default_theta_max(gn_msg_projection_type_t type)
     return is_ball ? PI : PI / 2;
 }
 
+static void set_emitter_defaults(struct gn_msg_emitter_frame *m)
+{
+    if (!m->has_response && m->pixel_format != GN_MSG_PIXEL_FORMAT_RGB_F16)
+        m->response.type = GN_MSG_RESPONSE_TYPE_SRGB;
+    m->has_response = true;
+    if (m->scale == 0)
+        m->scale = 1;
+}
+
 static void set_environment_defaults(struct gn_msg_environment_frame *m)
 {
     struct gn_msg_projection *p = &m->projection;
@@ -404,7 +444,9 @@ static void set_environment_defaults(struct gn_msg_environment_frame *m)
 
 void gn_wire_set_defaults(uint16_t type, void *msg)
 {
-    if (type == GN_WIRE_ENVIRONMENT_FRAME) {
+    if (type == GN_WIRE_EMITTER_FRAME) {
+        set_emitter_defaults(msg);
+    } else if (type == GN_WIRE_ENVIRONMENT_FRAME) {
         set_environment_defaults(msg);
     } else if (type == GN_WIRE_CAMERA) {
         struct gn_msg_camera *m = msg;

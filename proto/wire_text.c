@@ -137,6 +137,8 @@ size_t gn_wire_get_pixel_bytes(enum gn_msg_pixel_format format)
     case GN_MSG_PIXEL_FORMAT_MONO12:
     case GN_MSG_PIXEL_FORMAT_MONO16:
         return 2;
+    case GN_MSG_PIXEL_FORMAT_RGB8:
+        return 3;
     case GN_MSG_PIXEL_FORMAT_JPEG:
     case GN_MSG_PIXEL_FORMAT_EXR:
     case GN_MSG_PIXEL_FORMAT_UNSPECIFIED:

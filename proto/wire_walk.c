@@ -54,6 +54,7 @@ static const struct field transform[] = {GN_MSG_TRANSFORM_FIELDLIST(FIELD, 0)};
 static const struct field response[] = {GN_MSG_RESPONSE_FIELDLIST(FIELD, 0)};
 static const struct field projection[] = {GN_MSG_PROJECTION_FIELDLIST(FIELD, 0)};
 static const struct field environment_frame[] = {GN_MSG_ENVIRONMENT_FRAME_FIELDLIST(FIELD, 0)};
+static const struct field emitter_frame[] = {GN_MSG_EMITTER_FRAME_FIELDLIST(FIELD, 0)};
 static const struct field pose[] = {GN_MSG_POSE_FIELDLIST(FIELD, 0)};
 static const struct field camera[] = {GN_MSG_CAMERA_FIELDLIST(FIELD, 0)};
 static const struct field frame_view[] = {GN_MSG_FRAME_VIEW_FIELDLIST(FIELD, 0)};
@@ -78,6 +79,7 @@ static const struct message messages[] = {
     MESSAGE(RESPONSE, response),
     MESSAGE(PROJECTION, projection),
     MESSAGE(ENVIRONMENT_FRAME, environment_frame),
+    MESSAGE(EMITTER_FRAME, emitter_frame),
     MESSAGE(POSE, pose),
     MESSAGE(CAMERA, camera),
     MESSAGE(FRAME_VIEW, frame_view),
@@ -103,6 +105,8 @@ static const struct {
     {GN_MSG_RESPONSE_FIELDS, GN_MSG_RESPONSE_TYPE_TAG, 0, _GN_MSG_RESPONSE_TYPE_MAX},
     {GN_MSG_PROJECTION_FIELDS, GN_MSG_PROJECTION_TYPE_TAG, 1, _GN_MSG_PROJECTION_TYPE_MAX},
     {GN_MSG_ENVIRONMENT_FRAME_FIELDS, GN_MSG_ENVIRONMENT_FRAME_PIXEL_FORMAT_TAG, 1,
+     _GN_MSG_PIXEL_FORMAT_MAX},
+    {GN_MSG_EMITTER_FRAME_FIELDS, GN_MSG_EMITTER_FRAME_PIXEL_FORMAT_TAG, 1,
      _GN_MSG_PIXEL_FORMAT_MAX},
     {GN_MSG_FRAME_VIEW_FIELDS, GN_MSG_FRAME_VIEW_PICTURE_FORMAT_TAG, 0, _GN_MSG_PICTURE_FORMAT_MAX},
     {GN_MSG_FRAME_FIELDS, GN_MSG_FRAME_RESULT_FORMAT_TAG, 0, _GN_MSG_PICTURE_FORMAT_MAX},

@@ -46,6 +46,9 @@ static enum gn_pixel_layout get_layout(enum gn_msg_pixel_format format, int *out
     case GN_MSG_PIXEL_FORMAT_RGB16:
         *out_code_max = 65535;
         return GN_PIXELS_RGB_U16;
+    case GN_MSG_PIXEL_FORMAT_RGB8:
+        *out_code_max = 255;
+        return GN_PIXELS_RGB_U8;
     default:
         return GN_PIXELS_IMAGE;
     }

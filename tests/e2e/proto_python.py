@@ -21,10 +21,11 @@ TOOL = sys.argv[1]
 # Written apart from the C table on purpose, as PROTOCOL.md has it.
 TYPES = {
     1: 'Hello', 2: 'Welcome', 3: 'Redirect', 4: 'Error', 5: 'Bye', 6: 'Ping', 7: 'Pong',
-    16: 'EnvironmentFrame', 17: 'Pose', 18: 'Camera', 19: 'Frame',
+    16: 'EnvironmentFrame', 17: 'Pose', 18: 'Camera', 19: 'Frame', 20: 'EmitterFrame',
     32: 'Result', 33: 'Dropped', 34: 'LightingState', 35: 'Statistics',
 }
-NAMES = {'EnvironmentFrame': 'ENVIRONMENT_FRAME', 'LightingState': 'LIGHTING_STATE'}
+NAMES = {'EnvironmentFrame': 'ENVIRONMENT_FRAME', 'EmitterFrame': 'EMITTER_FRAME',
+         'LightingState': 'LIGHTING_STATE'}
 
 
 def f32(x):
@@ -41,6 +42,8 @@ FIXED = {
     'Projection.type': (pb.PROJECTION_TYPE_KANNALA_BRANDT,) * 2,
     'Projection.theta_max': (1.5, math.pi), 'EnvironmentFrame.pixel_format': (pb.PIXEL_FORMAT_RGB16,
                                                                               pb.PIXEL_FORMAT_MONO12),
+    'EmitterFrame.width': (5, 2048), 'EmitterFrame.height': (3, 2), 'EmitterFrame.pixel_format': (
+        pb.PIXEL_FORMAT_RGB8, pb.PIXEL_FORMAT_RGB_F16),
     'EnvironmentFrame.width': (5, 8192), 'EnvironmentFrame.height': (3, 2), 'Pose.confidence': (0.5, 1.0),
     'Camera.index': (2, 3), 'Camera.width': (640, 8192), 'Camera.height': (480, 8192),
     'Frame.jpeg_quality': (85, 100), 'Frame.lighting_wait_ms': (250, 60000),
@@ -57,12 +60,13 @@ STRING_BYTES = {  # without the NUL of C
     'Welcome.server_name': 63, 'Welcome.server_version': 31, 'Welcome.room': 63, 'Redirect.host': 255,
     'Error.sentence': 511, 'Bye.sentence': 255, 'Pose.object': 63, 'LeftOut.pass': 31,
     'LeftOut.why': 127, 'Dropped.sentence': 255, 'LightingState.room': 63, 'LightingState.node': 63,
-    'Statistics.room': 63,
+    'Statistics.room': 63, 'EmitterFrame.stream': 63,
 }
 BYTES_BYTES = {'Hello.resume_token': 32, 'Hello.ticket': 64, 'Welcome.resume_token': 32,
                'Redirect.ticket': 64}
 EXTREMES = {F.TYPE_UINT32: 2**32 - 1, F.TYPE_UINT64: 2**64 - 1, F.TYPE_INT64: -2**63}
-MUST_BE_ZERO = {'Camera.response.table_entries'}  # no table can travel with a camera
+MUST_BE_ZERO = {'Camera.response.table_entries',  # no table can travel with a camera
+                'EmitterFrame.response.table_entries'}
 COUNTER = [10]
 
 
@@ -132,6 +136,8 @@ def payload_bytes(m):
     if isinstance(m, pb.EnvironmentFrame):
         size = {pb.PIXEL_FORMAT_RGB16: 6, pb.PIXEL_FORMAT_MONO12: 2}[m.pixel_format]
         return m.response.table_entries * 4 + m.width * m.height * size
+    if isinstance(m, pb.EmitterFrame):
+        return m.width * m.height * {pb.PIXEL_FORMAT_RGB8: 3, pb.PIXEL_FORMAT_RGB_F16: 6}[m.pixel_format]
     if isinstance(m, pb.LightingState):
         return 32 * m.light_count + 6 * m.map_width * m.map_height
     if isinstance(m, (pb.Frame, pb.Result)):

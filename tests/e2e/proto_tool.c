@@ -136,6 +136,7 @@ DEFINE_DUMP(BYE, bye)
 DEFINE_DUMP(PING, ping)
 DEFINE_DUMP(PONG, pong)
 DEFINE_DUMP(ENVIRONMENT_FRAME, environment_frame)
+DEFINE_DUMP(EMITTER_FRAME, emitter_frame)
 DEFINE_DUMP(POSE, pose)
 DEFINE_DUMP(CAMERA, camera)
 DEFINE_DUMP(FRAME, frame)
@@ -156,6 +157,7 @@ static const dump_fn dumpers[] = {
     DUMPER(PING, ping),
     DUMPER(PONG, pong),
     DUMPER(ENVIRONMENT_FRAME, environment_frame),
+    DUMPER(EMITTER_FRAME, emitter_frame),
     DUMPER(POSE, pose),
     DUMPER(CAMERA, camera),
     DUMPER(FRAME, frame),

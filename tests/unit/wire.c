@@ -60,7 +60,7 @@ static void test_round_trip(void **state)
         assert_int_equal(again_len, len);
         assert_memory_equal(again, buf, len);
     }
-    assert_int_equal(row, 15);
+    assert_int_equal(row, 16);
 }
 
 static void test_small_buffer_is_refused(void **state)
@@ -196,9 +196,9 @@ static void test_every_float_must_be_finite(void **state)
             visited += p.visited;
         }
     }
-    // WELCOME 1, ENVIRONMENT_FRAME 34, POSE 8, CAMERA 23, FRAME 4 x 7, RESULT 10, LIGHTING 30,
-    // STATISTICS 3.
-    assert_int_equal(visited, 3 * 134);
+    // WELCOME 1, ENVIRONMENT_FRAME 34, EMITTER_FRAME 5, POSE 8, CAMERA 23, FRAME 4 x 7, RESULT 10,
+    // LIGHTING 30, STATISTICS 3.
+    assert_int_equal(visited, 3 * 142);
 }
 
 /** What one change of a sample must lead to, from the encoder and the decoder alike. */
@@ -230,12 +230,12 @@ static void test_enums_out_of_range(void **state)
 {
     (void)state;
     EXPECT_REFUSED(HELLO, hello, role = 0, "HELLO.role");
-    EXPECT_REFUSED(HELLO, hello, role = 4, "HELLO.role");
+    EXPECT_REFUSED(HELLO, hello, role = 5, "HELLO.role");
     EXPECT_REFUSED(ERROR, error, code = 0, "ERROR.code");
     EXPECT_REFUSED(BYE, bye, reason = 0, "BYE.reason");
     EXPECT_REFUSED(BYE, bye, reason = 4, "BYE.reason");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, pixel_format = 0, "pixel_format");
-    EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, pixel_format = 9, "pixel_format");
+    EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, pixel_format = 10, "pixel_format");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 0, "projection.type");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, projection.type = 11, "projection.type");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, response.type = 5, "response.type");
@@ -279,6 +279,17 @@ static void test_values_out_of_range(void **state)
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, exposure_s = -1, "exposure");
     EXPECT_REFUSED(ENVIRONMENT_FRAME, environment_frame, world_from_probe.position_m[2] = -2e6,
                    "position_m[2]");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, stream[0] = 0, "stream");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, sequence = 0, "sequence");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, width = 2049, "2049 x 1");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, height = 0, "2 x 0");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, height = 2, "payload");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, pixel_format = GN_MSG_PIXEL_FORMAT_RGB_F32,
+                   "pixel_format");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, scale = -1, "scale");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, response.type = GN_MSG_RESPONSE_TYPE_TABLE,
+                   "table");
+    EXPECT_REFUSED(EMITTER_FRAME, emitter_frame, response.gamma = 0, "gamma");
     EXPECT_REFUSED(POSE, pose, has_world_from_object = false, "world_from_object");
     EXPECT_REFUSED(POSE, pose, world_from_object.orientation[3] = 0, "orientation");
     EXPECT_REFUSED(POSE, pose, confidence = 1.5f, "confidence");

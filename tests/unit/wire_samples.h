@@ -115,6 +115,18 @@ static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_mess
     case GN_WIRE_ENVIRONMENT_FRAME:
         sample_environment(&m->environment_frame);
         return 5 * 4 + 3 * 2 * 6;
+    case GN_WIRE_EMITTER_FRAME:
+        m->emitter_frame = (struct gn_msg_emitter_frame){
+            .stream = "tv",
+            .sequence = UINT64_MAX,
+            .capture_time_ns = INT64_MIN,
+            .width = 2,
+            .height = 1,
+            .pixel_format = GN_MSG_PIXEL_FORMAT_RGB_F16,
+            .has_response = true,
+            .response = {GN_MSG_RESPONSE_TYPE_GAMMA, 2.2, 0.1, 0.2, 0.3, 0},
+            .scale = 1e-12};
+        return 2 * 6;
     case GN_WIRE_POSE:
         m->pose = (struct gn_msg_pose){"teapot", true, sample_transform, INT64_MIN, 1};
         return 0;
