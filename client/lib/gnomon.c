@@ -190,6 +190,12 @@ int gn_client_send_environment(struct gn_client *client,
     return gn_client_send(client, GN_WIRE_ENVIRONMENT_FRAME, frame, payload, payload_bytes);
 }
 
+int gn_client_send_emitter(struct gn_client *client, const struct gn_msg_emitter_frame *frame,
+                           const void *payload, size_t payload_bytes)
+{
+    return gn_client_send(client, GN_WIRE_EMITTER_FRAME, frame, payload, payload_bytes);
+}
+
 int gn_client_send_pose(struct gn_client *client, const struct gn_msg_pose *pose)
 {
     return gn_client_send(client, GN_WIRE_POSE, pose, NULL, 0);

@@ -101,6 +101,9 @@ int64_t gn_client_get_round_trip_ns(const struct gn_client *client);
 GN_MUST_USE int gn_client_send_environment(struct gn_client *client,
                                            const struct gn_msg_environment_frame *frame,
                                            const void *payload, size_t payload_bytes);
+GN_MUST_USE int gn_client_send_emitter(struct gn_client *client,
+                                       const struct gn_msg_emitter_frame *frame,
+                                       const void *payload, size_t payload_bytes);
 GN_MUST_USE int gn_client_send_pose(struct gn_client *client, const struct gn_msg_pose *pose);
 GN_MUST_USE int gn_client_send_camera(struct gn_client *client, const struct gn_msg_camera *camera);
 GN_MUST_USE int gn_client_send_frame(struct gn_client *client, const struct gn_msg_frame *frame,

@@ -38,6 +38,9 @@ GETTER(frames_out)
 GETTER(environment_in)
 GETTER(environment_superseded)
 GETTER(environment_refused)
+GETTER(emitter_in)
+GETTER(emitter_superseded)
+GETTER(emitter_refused)
 GETTER(holdable_fps_room)
 GETTER(light_published)
 GETTER(n_lights)
@@ -60,6 +63,12 @@ static const struct metric metrics[] = {
      "Environment frames that a later one replaced unread.", get_environment_superseded},
     {"gnomon_environment_frames_refused_total", "counter", "Environment frames that were bad.",
      get_environment_refused},
+    {"gnomon_emitter_frames_received_total", "counter", "Pictures of emitters received.",
+     get_emitter_in},
+    {"gnomon_emitter_frames_superseded_total", "counter",
+     "Pictures of emitters that a later one replaced unread.", get_emitter_superseded},
+    {"gnomon_emitter_frames_refused_total", "counter", "Pictures of emitters that were bad.",
+     get_emitter_refused},
     {"gnomon_lighting_states_total", "counter", "Lighting states published.", get_light_published},
     {"gnomon_lights", "gauge", "Lights of the lighting state.", get_n_lights},
     {"gnomon_lighting_age_seconds", "gauge",

@@ -31,7 +31,7 @@ static void append(json_t *array, json_t *value, bool *is_short)
 
 static const char *get_role_name(enum gn_msg_role role)
 {
-    return role == GN_MSG_ROLE_PROBE ? "probe" : "viewer";
+    return role == GN_MSG_ROLE_PROBE ? "probe" : role == GN_MSG_ROLE_SCREEN ? "screen" : "viewer";
 }
 
 static json_t *make_sessions(struct gn_room *room, bool *is_short)
@@ -146,6 +146,7 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
     // clang-format off
     json_t *json = json_pack(
         "{s:s, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I, s:I, s:o, s:I, s:I, s:I,"
+        " s:I, s:I, s:I, s:I, s:i,"
         " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o, s:o}",
         "name", gn_room_get_options(room)->name,
         "scene", "objects", f->n_objects, "real_triangles", f->n_real_triangles,
@@ -156,10 +157,15 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
         "environment_frames_in", (json_int_t)f->environment_in,
         "environment_frames_superseded", (json_int_t)f->environment_superseded,
         "environment_frames_refused", (json_int_t)f->environment_refused,
+        "emitter_frames_in", (json_int_t)f->emitter_in,
+        "emitter_frames_superseded", (json_int_t)f->emitter_superseded,
+        "emitter_frames_refused", (json_int_t)f->emitter_refused,
+        "emitter_frames_shown", (json_int_t)f->emitter_shown, "near_lights", f->n_near,
         "latency_ms", "p50", f->latency_p50_ms, "p90", f->latency_p90_ms, "p99", f->latency_p99_ms,
         "busy_p50_ms", f->busy_p50_ms,
         "holdable_fps_640x480", "room", f->holdable_fps_room, "viewer", f->holdable_fps_viewer,
-        "light", make_light(f), "lit_by", make_probes(room, is_short), "last_receipt", make_receipt(f, is_short),
+        "light", make_light(f), "lit_by", make_probes(room, is_short),
+        "last_receipt", make_receipt(f, is_short),
         "sessions", make_sessions(room, is_short));
     // clang-format on
     free(f);

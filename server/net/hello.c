@@ -42,10 +42,12 @@ static int check_hello(const struct gn_msg_hello *hello, struct gn_hello_answer 
     if (hello->role == GN_MSG_ROLE_TRACKER)
         return refuse(answer, GN_MSG_ERROR_CODE_UNSUPPORTED,
                       gn_error_set(error, -EOPNOTSUPP,
-                                   "role: trackers are not built yet; probe and viewer are"));
-    if (hello->role != GN_MSG_ROLE_PROBE && hello->role != GN_MSG_ROLE_VIEWER)
+                                   "role: trackers are not built yet; probe, viewer and "
+                                   "screen are"));
+    if (hello->role != GN_MSG_ROLE_PROBE && hello->role != GN_MSG_ROLE_VIEWER &&
+        hello->role != GN_MSG_ROLE_SCREEN)
         return refuse(answer, GN_MSG_ERROR_CODE_BAD_VALUE,
-                      gn_error_set(error, -EINVAL, "role: probe and viewer are right"));
+                      gn_error_set(error, -EINVAL, "role: probe, viewer and screen are right"));
     return 0;
 }
 
@@ -66,6 +68,8 @@ static uint32_t get_max_payload(const struct gn_room_options *o, enum gn_msg_rol
         bytes = (uint64_t)o->max_environment_width * (uint64_t)o->max_environment_height * 12 +
                 4 * GN_LIMIT_TABLE_ENTRIES;
         limit = GN_LIMIT_ENVIRONMENT_BYTES;
+    } else if (role == GN_MSG_ROLE_SCREEN) {
+        bytes = limit = GN_LIMIT_EMITTER_BYTES;
     } else {
         bytes =
             (uint64_t)o->max_picture_width * (uint64_t)o->max_picture_height * 3 * GN_LIMIT_VIEWS;

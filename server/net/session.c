@@ -43,6 +43,8 @@ enum gn_session_action gn_session_get_action(enum gn_session_state state, enum g
         return GN_SESSION_LEAVE;
     case GN_WIRE_ENVIRONMENT_FRAME:
         return role == GN_MSG_ROLE_PROBE ? GN_SESSION_SERVE : GN_SESSION_REFUSE;
+    case GN_WIRE_EMITTER_FRAME:
+        return role == GN_MSG_ROLE_SCREEN ? GN_SESSION_SERVE : GN_SESSION_REFUSE;
     case GN_WIRE_POSE:
     case GN_WIRE_CAMERA:
     case GN_WIRE_FRAME:
@@ -204,7 +206,9 @@ static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int6
     gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: %s in room %s as %s", s->peer,
                    (unsigned long long)s->id, hello->client_name,
                    gn_room_get_options(s->room)->name,
-                   s->role == GN_MSG_ROLE_PROBE ? "probe" : "viewer");
+                   s->role == GN_MSG_ROLE_PROBE    ? "probe"
+                   : s->role == GN_MSG_ROLE_SCREEN ? "screen"
+                                                   : "viewer");
 }
 
 static void answer_ping(struct gn_session *s, const struct gn_msg_ping *ping, int64_t now_ns)
@@ -233,6 +237,10 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
     case GN_WIRE_ENVIRONMENT_FRAME:
         about_id = m->environment_frame.sequence;
         rc = gn_room_put_environment(s->member, &m->environment_frame, payload, &error);
+        break;
+    case GN_WIRE_EMITTER_FRAME:
+        about_id = m->emitter_frame.sequence;
+        rc = gn_room_put_emitter(s->member, &m->emitter_frame, payload, &error);
         break;
     case GN_WIRE_CAMERA:
         about_id = m->camera.index;
@@ -281,6 +289,8 @@ static void take_message(struct gn_session *s, const struct gn_conn_message *mes
                  : type == GN_WIRE_HELLO      ? "the session is open already"
                  : s->role == GN_MSG_ROLE_PROBE
                      ? "a probe sends ENVIRONMENT_FRAME, PING, PONG and BYE"
+                 : s->role == GN_MSG_ROLE_SCREEN
+                     ? "a screen sends EMITTER_FRAME, PING, PONG and BYE"
                      : "a viewer sends CAMERA, POSE, FRAME, PING, PONG and BYE");
         gn_session_fail(s, GN_MSG_ERROR_CODE_UNEXPECTED, type, 0, sentence, now_ns);
         return;

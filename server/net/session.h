@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * One connection's session as a state machine. What may come in which state:
+ * One connection's session as a state machine. What may come in which state (EMITTER_FRAME as
+ * ENVIRONMENT_FRAME, a screen's):
  *
  *   state    | HELLO         | PING PONG | BYE  | ENVIRONMENT_FRAME | POSE CAMERA FRAME | other
  *   ---------+---------------+-----------+------+-------------------+-------------------+------

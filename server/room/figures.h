@@ -31,6 +31,8 @@ struct gn_room_figures {
     uint64_t frames_in, frames_out, frames_dropped;
     uint64_t dropped_by_reason[GN_MSG_DROP_REASON_INTERNAL + 1]; // by enum gn_msg_drop_reason
     uint64_t environment_in, environment_superseded, environment_refused;
+    uint64_t emitter_in, emitter_superseded, emitter_refused, emitter_shown;
+    int n_near;                       // near lights of the state
     bool has_environment_waiting;     // one is unread: nobody in the room needs light
     struct gn_time_histogram latency; // from the last byte received to the answer posted
     struct gn_time_histogram busy;    // the render thread's time

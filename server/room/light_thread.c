@@ -28,9 +28,11 @@ struct work {
     bool has_job;
     struct gn_environment_job job;      // where has_job
     struct gn_lighting_state *previous; // a reference: the last state of the job's probe, or NULL
-    bool is_stale;                      // a probe has left: the others' lights are to be joined
-    struct subscribers newcomers;       // who has not been sent the states that are there
-    int n_lights;                       // > 0 where newcomers.n > 0
+    bool is_stale;                      // the probes' lights are to be joined anew
+    bool has_picture;
+    struct gn_emitter_job picture; // where has_picture
+    struct subscribers newcomers;  // who has not been sent the states that are there
+    int n_lights;                  // > 0 where newcomers.n > 0
     struct gn_lighting_state *lights[GN_PROBES_MAX]; // references: each probe's
 };
 
@@ -75,34 +77,37 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
             out->n_lights = gn_probes_get_lights(&room->probes, out->lights, &newest);
         out->has_job =
             gn_probes_take(&room->probes, is_light_wanted_locked(room), &out->job, &out->previous);
+        out->has_picture =
+            gn_screens_take(&room->screens, is_light_wanted_locked(room), &out->picture);
         out->is_stale = room->is_light_stale;
-        if (out->has_job || out->n_lights > 0 || out->is_stale)
+        if (out->has_job || out->has_picture || out->n_lights > 0 || out->is_stale)
             break;
         gn_cond_wait(&room->light_wake, &room->mu);
     }
     gn_mutex_unlock(&room->mu);
-    return out->has_job || out->n_lights > 0 || out->is_stale;
+    return out->has_job || out->has_picture || out->n_lights > 0 || out->is_stale;
 }
 
-/** Tells the probe what is wrong with its frame. */
-static void refuse(struct gn_room *room, const struct gn_environment_job *job, int code,
-                   const char *sentence)
+/** Tells the sender what is wrong with its ENVIRONMENT_FRAME or EMITTER_FRAME. */
+static void refuse(struct gn_room *room, uint64_t session_id, enum gn_wire_type type,
+                   uint64_t sequence, int code, const char *sentence)
 {
+    bool is_emitter = type == GN_WIRE_EMITTER_FRAME;
     gn_mutex_lock(&room->mu);
-    room->figures.environment_refused++;
+    room->figures.environment_refused += !is_emitter;
+    room->figures.emitter_refused += is_emitter;
     gn_mutex_unlock(&room->mu);
     static struct gn_log_limiter limiter = {.burst = 50, .interval_ns = GN_NS_PER_S};
-    gn_log_limited(&limiter, GN_LOG_DEBUG,
-                   "room %s: session %llu: environment frame %llu refused: %s", room->name,
-                   (unsigned long long)job->session_id, (unsigned long long)job->frame.sequence,
-                   sentence);
+    gn_log_limited(&limiter, GN_LOG_DEBUG, "room %s: session %llu: %s %llu refused: %s", room->name,
+                   (unsigned long long)session_id, gn_wire_get_info(type)->name,
+                   (unsigned long long)sequence, sentence);
     struct gn_note *note;
     if (gn_mailbox_get_blank(room->options.mailbox, &note) < 0)
         return;
-    note->session_id = job->session_id;
+    note->session_id = session_id;
     gn_note_set_error(note,
                       code == -ENOMEM ? GN_MSG_ERROR_CODE_INTERNAL : GN_MSG_ERROR_CODE_BAD_VALUE,
-                      GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, sentence);
+                      type, sequence, sentence);
     gn_mailbox_post(room->options.mailbox, note);
 }
 
@@ -143,7 +148,77 @@ static void unref_all(struct gn_lighting_state **lights, int n)
         gn_lighting_state_unref(&lights[i]);
 }
 
-/** Makes the light of all probes the room's. */
+/** Makes the state the room's light; takes the reference. n_lights: distant ones, < 0: as before.
+ */
+static void show(struct gn_room *room, struct gn_lighting_state *state, int n_lights)
+{
+    gn_mutex_lock(&room->mu);
+    struct gn_lighting_state *old = room->light;
+    room->light = state;
+    room->figures.has_light = true;
+    room->figures.light_sequence = state->sequence;
+    room->figures.light_capture_ns = state->capture_time_ns;
+    room->figures.n_near = state->n_near;
+    if (n_lights >= 0)
+        room->figures.n_lights = n_lights;
+    gn_cond_signal(&room->render_wake);
+    gn_mutex_unlock(&room->mu);
+    gn_lighting_state_unref(&old);
+}
+
+static bool gives_light(const struct gn_emission *emission)
+{
+    for (int i = 0; emission && i < emission->n_lights; i++)
+        for (int c = 0; c < 3; c++)
+            if (emission->lights[i].intensity[c] > 0)
+                return true;
+    return false;
+}
+
+/** Shows what the emitters send now, in the light that is there or, where they give some, in the
+ * dark. 0 or a negative errno. */
+static int show_emission(struct gn_room *room)
+{
+    struct gn_emission *emission = gn_emitters_get_emission(room->emitters);
+    struct gn_lighting_state *state = NULL;
+    struct gn_error error;
+    gn_mutex_lock(&room->mu);
+    struct gn_lighting_state *light = room->light ? gn_lighting_state_ref(room->light) : NULL;
+    gn_mutex_unlock(&room->mu);
+    int rc = 0;
+    if (light)
+        rc = gn_lighting_state_replace_emission(light, emission, &state);
+    else if (gives_light(emission))
+        rc = gn_lighting_state_create_dark(emission, &room->options.light,
+                                           gn_clock_get_monotonic_ns(), &state, &error);
+    if (rc == 0 && state)
+        show(room, state, light ? -1 : 0);
+    gn_lighting_state_unref(&light);
+    gn_emission_unref(&emission);
+    return rc;
+}
+
+/** From one picture to the near light of its stream's emitters: the map stays. */
+static void show_picture(struct gn_room *room, struct gn_screen_decoder *decoder,
+                         struct gn_emitter_job *job)
+{
+    struct gn_error error = {0};
+    int rc = gn_screen_decode(decoder, &job->frame, job->payload, &error);
+    if (rc == 0)
+        rc = gn_emitters_set_picture(room->emitters, job->stream, &decoder->linear, &error);
+    if (rc == 0 && (rc = show_emission(room)) < 0)
+        gn_error_set(&error, rc, "out of memory");
+    if (rc < 0) {
+        refuse(room, job->session_id, GN_WIRE_EMITTER_FRAME, job->frame.sequence, rc, error.text);
+    } else {
+        gn_mutex_lock(&room->mu);
+        room->figures.emitter_shown++;
+        gn_mutex_unlock(&room->mu);
+    }
+    gn_buf_unref(&job->payload);
+}
+
+/** Makes the light of all probes the room's, and the scene's own with it. */
 static void join_lights(struct gn_room *room)
 {
     struct gn_lighting_state *lights[GN_PROBES_MAX], *joined;
@@ -152,22 +227,24 @@ static void join_lights(struct gn_room *room)
     int n = gn_probes_get_lights(&room->probes, lights, &newest);
     room->is_light_stale = false; // a probe that leaves from here on makes it so again
     gn_mutex_unlock(&room->mu);
-    if (n == 0)
+    if (n == 0) {
+        if (show_emission(room) < 0)
+            gn_log(GN_LOG_WARN, "room %s: the scene's own light not shown: out of memory",
+                   room->name);
         return;
+    }
     for (int i = 0; i < n; i++)
         n_lights += lights[i]->n_lights;
+    struct gn_emission *emission = gn_emitters_get_emission(room->emitters);
     int rc = gn_lighting_state_join(lights, n, newest, &joined);
+    if (rc == 0 && emission) {
+        struct gn_lighting_state *dark = joined;
+        rc = gn_lighting_state_replace_emission(dark, emission, &joined);
+        gn_lighting_state_unref(&dark);
+    }
+    gn_emission_unref(&emission);
     if (rc == 0) {
-        gn_mutex_lock(&room->mu);
-        struct gn_lighting_state *old = room->light;
-        room->light = joined;
-        room->figures.has_light = true;
-        room->figures.light_sequence = joined->sequence;
-        room->figures.light_capture_ns = joined->capture_time_ns;
-        room->figures.n_lights = n_lights;
-        gn_cond_signal(&room->render_wake);
-        gn_mutex_unlock(&room->mu);
-        gn_lighting_state_unref(&old);
+        show(room, joined, n_lights);
     } else {
         gn_log(GN_LOG_WARN, "room %s: the lights of %d probes not joined: %s", room->name, n,
                strerror(-rc));
@@ -222,7 +299,8 @@ static void make_light(struct gn_room *room, struct gn_environment_decoder *deco
         rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
                                       &state, &error);
     if (rc < 0)
-        refuse(room, job, rc, error.text);
+        refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, rc,
+               error.text);
     else
         publish(room, job->session_id, state, ms_decode);
     gn_buf_unref(&job->payload);
@@ -232,6 +310,7 @@ void gn_room_run_light(void *context)
 {
     struct gn_room *room = context;
     struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
+    struct gn_screen_decoder screen_decoder = {0};
     struct work work;
     while (wait_for_work(room, &work)) {
         if (work.is_stale)
@@ -239,10 +318,13 @@ void gn_room_run_light(void *context)
         for (int i = 0; i < work.n_lights; i++)
             tell_subscribers(room, work.lights[i], &work.newcomers);
         unref_all(work.lights, work.n_lights);
+        if (work.has_picture)
+            show_picture(room, &screen_decoder, &work.picture);
         if (work.has_job)
             make_light(room, decoder, &work.job, work.previous);
         gn_lighting_state_unref(&work.previous);
     }
+    gn_screen_decoder_finish(&screen_decoder);
     if (decoder)
         gn_environment_decoder_finish(decoder);
     free(decoder);

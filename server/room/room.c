@@ -71,6 +71,15 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
         gn_error_set(out_error, rc, "room %s: %s", room->name, scene_error.text);
         goto out;
     }
+    rc = gn_emitters_create(room->scene, NULL, &room->emitters, &scene_error);
+    if (rc == 0)
+        rc = gn_screens_init(&room->screens, room->emitters);
+    if (rc < 0) {
+        gn_error_set(out_error, rc, "room %s: %s", room->name,
+                     scene_error.text[0] ? scene_error.text : "out of memory");
+        goto out;
+    }
+    room->is_light_stale = true;
     rc = gn_thread_start(&room->light_thread, "gn-light", gn_room_run_light, room);
     if (rc == 0)
         rc = gn_thread_start(&room->render_thread, "gn-render", gn_room_run_render, room);
@@ -101,6 +110,8 @@ void gn_room_destroy(struct gn_room **room)
     gn_thread_join(&r->light_thread);
     gn_thread_join(&r->render_thread);
     gn_probes_finish(&r->probes);
+    gn_screens_finish(&r->screens);
+    gn_emitters_destroy(&r->emitters);
     gn_lighting_state_unref(&r->light);
     gn_snapshot_unref(&r->composite);
     if (r->scheduler)
@@ -371,4 +382,35 @@ int gn_room_put_environment(struct gn_room_session *session,
     gn_buf_unref(&job.payload);
     return gn_error_set(out_error, rc, "room %s is lit by %d probes, it takes no more", o->name,
                         GN_PROBES_MAX);
+}
+
+int gn_room_put_emitter(struct gn_room_session *session, const struct gn_msg_emitter_frame *frame,
+                        struct gn_buf *payload, struct gn_error *out_error)
+{
+    struct gn_room *room = session->room;
+    if (frame->sequence <= session->last_emitter_sequence)
+        return gn_error_set(out_error, -EDOM,
+                            "EMITTER_FRAME sequence %llu is not above the last one, %llu",
+                            (unsigned long long)frame->sequence,
+                            (unsigned long long)session->last_emitter_sequence);
+    session->last_emitter_sequence = frame->sequence;
+    int stream =
+        gn_screens_find(&room->screens, frame->stream, out_error); // names stay as they are
+    struct gn_buf *superseded = NULL;
+    gn_mutex_lock(&room->mu);
+    room->figures.emitter_in++;
+    if (stream >= 0) {
+        const struct gn_emitter_job job = {.session_id = session->id,
+                                           .stream = stream,
+                                           .frame = *frame,
+                                           .payload = gn_buf_ref(payload)};
+        gn_screens_put(&room->screens, &job, &superseded);
+        room->figures.emitter_superseded += superseded != NULL;
+        gn_cond_signal(&room->light_wake);
+    } else {
+        room->figures.emitter_refused++;
+    }
+    gn_mutex_unlock(&room->mu);
+    gn_buf_unref(&superseded);
+    return stream < 0 ? stream : 0;
 }

@@ -47,7 +47,7 @@ struct gn_room_session;
 /** How a session takes part. */
 struct gn_room_member {
     uint64_t id;           // > 0, never used again
-    enum gn_msg_role role; // PROBE or VIEWER
+    enum gn_msg_role role; // PROBE, VIEWER or SCREEN
     const char *name;      // of the client; copied
     const char *peer;      // its address; copied
     bool want_lighting_states;
@@ -79,6 +79,16 @@ void gn_room_leave(struct gn_room_session **session);
 GN_MUST_USE int gn_room_put_environment(struct gn_room_session *session,
                                         const struct gn_msg_environment_frame *frame,
                                         struct gn_buf *payload, struct gn_error *out_error);
+
+/**
+ * The newest picture of a stream replaces its unread one. Pixels are decoded by the light thread,
+ * which posts an ERROR where they are bad, and publishes the light that is there with this near
+ * light. payload: as above. Returns 0, -ENOENT and a sentence (no such stream), -EDOM (sequence not
+ * rising).
+ */
+GN_MUST_USE int gn_room_put_emitter(struct gn_room_session *session,
+                                    const struct gn_msg_emitter_frame *frame,
+                                    struct gn_buf *payload, struct gn_error *out_error);
 
 /** Sets a camera of the session. Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_room_put_camera(struct gn_room_session *session,

@@ -13,6 +13,7 @@
 #include "server/room/probes.h"
 #include "server/room/room.h"
 #include "server/room/scheduler.h"
+#include "server/room/screens.h"
 
 /** Somebody who looked at a picture this recently wants the next one. */
 #define GN_ROOM_LOOK_NS (5 * GN_NS_PER_S)
@@ -33,7 +34,7 @@ struct gn_room_session {
     struct gn_camera cameras[GN_LIMIT_VIEWS];
     bool has_pose;
     struct gn_pose world_from_camera;
-    uint64_t last_frame_id, last_environment_sequence;
+    uint64_t last_frame_id, last_environment_sequence, last_emitter_sequence;
 
     bool was_told; // guarded by room->mu: it was sent a lighting state, or is about to be
     struct gn_session_figures figures; // guarded by room->mu
@@ -45,6 +46,7 @@ struct gn_room {
     char node[64];
     struct gn_scene *scene;       // owned, immutable
     struct gn_frame_maker *maker; // owner: render thread while it runs
+    struct gn_emitters *emitters; // owned; owner: light thread while it runs
     struct gn_thread light_thread;
     struct gn_thread render_thread;
 
@@ -56,7 +58,9 @@ struct gn_room {
     int n_viewers, n_probes, n_subscribers;
     struct gn_scheduler *scheduler;
     struct gn_probes probes;
-    bool is_light_stale;             // a probe has left: the others' lights are to be joined anew
+    struct gn_screens screens;
+    bool is_light_stale;             // a probe has left: the others' lights are to be joined anew;
+                                     // or the scene's own light is not shown yet
     struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
     int64_t light_asked_ns, composite_asked_ns; // when the page last looked; 0: never
     struct gn_snapshot *composite;              // a reference; NULL: nobody looks

@@ -145,9 +145,10 @@ static void test_mailbox(void **state)
 static void test_states(void **state)
 {
     (void)state;
-    static const uint16_t types[] = {1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 32, 33, 34, 35, 99};
-    static const char hello[] = "O...L...........", probe[] = "....LSSS........",
-                      viewer[] = "....LSS.SSS.....", closing[] = "................";
+    static const uint16_t types[] = {1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 32, 33, 34, 35, 99};
+    static const char hello[] = "O...L............", probe[] = "....LSSS.........",
+                      viewer[] = "....LSS.SSS......", screen[] = "....LSS....S.....",
+                      closing[] = ".................";
     static const char letters[] = ".OSL"; // by enum gn_session_action
     for (size_t i = 0; i < GN_ARRAY_LEN(types); i++) {
         const uint16_t type = types[i];
@@ -155,6 +156,8 @@ static void test_states(void **state)
         assert_int_equal(letters[gn_session_get_action(GN_SESSION_HELLO, 0, type)], hello[i]);
         assert_int_equal(letters[gn_session_get_action(GN_SESSION_OPEN, p, type)], probe[i]);
         assert_int_equal(letters[gn_session_get_action(GN_SESSION_OPEN, v, type)], viewer[i]);
+        assert_int_equal(letters[gn_session_get_action(GN_SESSION_OPEN, GN_MSG_ROLE_SCREEN, type)],
+                         screen[i]);
         assert_int_equal(letters[gn_session_get_action(GN_SESSION_CLOSING, v, type)], closing[i]);
         assert_int_equal(letters[gn_session_get_action(GN_SESSION_GONE, v, type)], closing[i]);
     }
