@@ -13,6 +13,7 @@
 struct run {
     struct gn_pool *pool;
     struct gn_scene *scene;
+    struct gn_render_needs needs;
     struct gn_lighting_state *light;
     struct gn_renderer *renderer;
     struct gn_camera camera;
@@ -39,8 +40,10 @@ static int read_inputs(const struct gn_cli_request *request, struct run *run,
         ret = gn_scene_read_file(request->scene, run->pool, &run->scene, out_error);
     run->ms_scene = get_ms_since(start_ns);
     start_ns = gn_clock_get_monotonic_ns();
-    if (ret == 0)
-        ret = gn_cli_read_light(request, run->pool, &run->light, out_error);
+    if (ret == 0) {
+        gn_render_get_needs(run->scene, &request->render, &run->needs);
+        ret = gn_cli_read_light(request, &run->needs, run->pool, &run->light, out_error);
+    }
     run->ms_light = get_ms_since(start_ns);
     return ret;
 }
@@ -77,6 +80,7 @@ static int run_request(const struct gn_cli_request *request, struct gn_error *ou
         .camera = &run.camera,
         .scene = run.scene,
         .light = run.light,
+        .needs = &run.needs,
         .layers = &run.layers,
         .background = request->background ? &run.background : NULL,
         .report = &run.report,

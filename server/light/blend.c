@@ -37,12 +37,17 @@ int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int n
     s->memory = NULL;
     s->figures = times->figures;
     s->in_time = times->in_time;
+    s->irradiance = first->irradiance;
+    s->has_lights = first->has_lights;
+    s->in_time = times->in_time;
+    s->stream = times->stream;
     s->sequence = times->sequence;
     s->capture_time_ns = times->capture_time_ns;
     s->published_time_ns = times->published_time_ns;
     s->ms_map = times->ms_map;
     s->ms_sh = times->ms_sh;
     s->ms_lights = times->ms_lights;
+    s->ms_temporal = times->ms_temporal;
     if (!s->lights) {
         gn_lighting_state_unref(&s);
         return -ENOMEM;

@@ -46,6 +46,15 @@ struct gn_render_options {
     uint64_t seed;           // of the reference's random paths
 };
 
+/** What of a lighting state the frames of a room can use; NULL: needed. Strings are static. */
+struct gn_render_needs {
+    const char *why_no_lights;
+    const char *why_no_sh; // the harmonics and the irradiance of any normal
+};
+/** For all frames of the scene with these options, of any view. */
+void gn_render_get_needs(const struct gn_scene *scene, const struct gn_render_options *options,
+                         struct gn_render_needs *out_needs);
+
 /**
  * The picture's layers; linear radiance. With B the radiance that the modelled real scene sends to
  * the pixel without the virtual objects, C the part of B whose light paths no virtual object cuts,

@@ -139,22 +139,24 @@ static int reserve_texels(struct gn_renderer *renderer)
 }
 
 /** Why these states cannot light a frame, or NULL. */
-static const char *check_light(const struct gn_blend *blend,
+static const char *check_light(const struct gn_scene *scene, const struct gn_blend *blend,
                                const struct gn_render_options *options)
 {
-    bool needs_sh = options->shading == GN_SHADING_IRRADIANCE;
+    struct gn_render_needs needs;
+    gn_render_get_needs(scene, options, &needs);
     for (int i = 0; i < blend->n && options->quality != GN_QUALITY_REFERENCE; i++) {
         if (blend->state[i]->n_lights > GN_LIGHTS_MAX)
             return "render: a lighting state has more lights than are used";
-        if (needs_sh && !blend->state[i]->has_sh)
+        if (!needs.why_no_sh && !blend->state[i]->has_sh)
             return "render: irradiance shading needs the SH irradiance, which this lighting state "
                    "leaves out";
     }
     return NULL;
 }
 
-static int check_request(const struct gn_camera *camera, const struct gn_blend *blend,
-                         const struct gn_render_options *options, struct gn_error *out_error)
+static int check_request(const struct gn_scene *scene, const struct gn_camera *camera,
+                         const struct gn_blend *blend, const struct gn_render_options *options,
+                         struct gn_error *out_error)
 {
     const char *reason = NULL;
     if (gn_camera_check(camera, &reason) < 0)
@@ -172,7 +174,7 @@ static int check_request(const struct gn_camera *camera, const struct gn_blend *
     if (options->paths_per_pixel < 0 || options->paths_per_pixel > MAX_PATHS)
         return gn_error_set(out_error, -EINVAL, "render: %d paths for each pixel, must be 1 to %d",
                             options->paths_per_pixel, MAX_PATHS);
-    reason = check_light(blend, options);
+    reason = check_light(scene, blend, options);
     return reason ? gn_error_set(out_error, -EINVAL, "%s", reason) : 0;
 }
 
@@ -514,7 +516,7 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
         options = &defaults;
     struct frame frame = {.camera = camera, .options = *options, .layers = layers};
     gn_blend_init(&frame.blend, light);
-    int ret = check_request(camera, &frame.blend, options, out_error);
+    int ret = check_request(renderer->scene, camera, &frame.blend, options, out_error);
     if (ret == 0)
         ret = prepare(renderer, camera, &frame.blend, options->quality, layers, out_error);
     if (ret < 0)

@@ -47,8 +47,12 @@ GN_MUST_USE int gn_cli_request_init(struct gn_cli_request *request, int argc, ch
 /** A zeroed one is fine. */
 void gn_cli_request_finish(struct gn_cli_request *request);
 
-/** Reads the environment picture and makes the lighting state. */
-GN_MUST_USE int gn_cli_read_light(const struct gn_cli_request *request, struct gn_pool *pool,
+/**
+ * Reads the environment picture and makes the lighting state, without what is not needed. What is
+ * written counts: a report needs the harmonics, a picture of the light its lights.
+ */
+GN_MUST_USE int gn_cli_read_light(const struct gn_cli_request *request,
+                                  const struct gn_render_needs *needs, struct gn_pool *pool,
                                   struct gn_lighting_state **out_state, struct gn_error *out_error);
 
 /** The camera picture: as linear radiance, and as its codes where it has 8 bits. */
@@ -72,6 +76,7 @@ struct gn_cli_result {
     const struct gn_layers *layers;
     const struct gn_cli_background *background; // NULL: none
     const struct gn_render_report *report;
+    const struct gn_render_needs *needs;
     int n_threads;
     double ms_scene, ms_light, ms_total;
 };

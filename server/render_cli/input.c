@@ -65,8 +65,9 @@ static int init_projection(const struct gn_cli_request *request, const struct gn
     return 0;
 }
 
-int gn_cli_read_light(const struct gn_cli_request *request, struct gn_pool *pool,
-                      struct gn_lighting_state **out_state, struct gn_error *out_error)
+int gn_cli_read_light(const struct gn_cli_request *request, const struct gn_render_needs *needs,
+                      struct gn_pool *pool, struct gn_lighting_state **out_state,
+                      struct gn_error *out_error)
 {
     static const int code_max[] = {0, 255, 65535}; // of enum gn_image_kind
     struct gn_image_file file = {0};
@@ -103,7 +104,10 @@ int gn_cli_read_light(const struct gn_cli_request *request, struct gn_pool *pool
     };
     memcpy(frame.world_from_probe, setup.world_from_probe.rotation, sizeof(frame.world_from_probe));
     memcpy(frame.position, setup.world_from_probe.translation, sizeof(frame.position));
-    ret = gn_lighting_state_create(&frame, NULL, &request->light, pool, out_state, &reason);
+    struct gn_light_options light = request->light;
+    light.no_sh = needs->why_no_sh && !request->report && !request->irradiance_map;
+    light.no_lights = needs->why_no_lights && !request->light_map;
+    ret = gn_lighting_state_create(&frame, NULL, &light, pool, out_state, &reason);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", request->env, reason.text);
 out:

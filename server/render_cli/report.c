@@ -81,20 +81,29 @@ fail:
     return NULL;
 }
 
+/** Why parts of the lighting state were not made; null: they were. */
+static json_t *make_left_out(const struct gn_cli_result *result)
+{
+    const struct gn_lighting_state *light = result->light;
+    return json_pack("{s:s?, s:s?}", "sh", light->has_sh ? NULL : result->needs->why_no_sh,
+                     "lights", light->has_lights ? NULL : result->needs->why_no_lights);
+}
+
 /** NULL where memory runs out. */
 static json_t *make_report(const struct gn_cli_request *request, const struct gn_cli_result *result)
 {
     const struct gn_render_report *r = result->report;
     const struct gn_scene *scene = result->scene;
     return json_pack(
-        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
+        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
         "s:I, s:{s:i, s:i, s:i}}",
         "version", GN_VERSION, "quality", gn_cli_get_quality_name(request->render.quality),
         "bounces", request->render.bounces, "width", result->camera->width, "height",
         result->camera->height, "threads", result->n_threads, "light_method",
         gn_light_method_get_name(request->light.method), "plan", make_plan(r), "timings_ms",
         make_timings(result), "rays", make_rays(r), "environment", make_map(result->light->map),
-        "sh", make_sh(result->light), "lights", r->n_lights, "estimated_error",
+        "sh", make_sh(result->light), "light_left_out", make_left_out(result), "lights",
+        r->n_lights, "estimated_error",
         r->estimated_error < 0.0 ? json_null() : json_real(r->estimated_error), "virtual_pixels",
         (json_int_t)r->n_virtual_pixels, "shadow_pixels", (json_int_t)r->n_shadow_pixels,
         "refined_pixels", (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects,
