@@ -42,6 +42,7 @@ static void get_light(const struct gn_options *o, const char *room, struct gn_li
         .irradiance = {.order = gn_options_get_enum(o, "room", room, "sh-order") == 0 ? 2 : 4,
                        .dering = gn_options_get_bool(o, "room", room, "sh-dering"),
                        .keep_lights = gn_options_get_bool(o, "room", room, "sh-keep-lights")},
+        .smoothing = 1e-3 * gn_options_get_double(o, "room", room, "light-smoothing-ms"),
     };
 }
 
@@ -66,6 +67,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
                 .shadow_unweighted = !gn_options_get_bool(o, "room", room, "shadow-cosine"),
                 .shadow_ignore_real = !gn_options_get_bool(o, "room", room, "shadow-real-blockers"),
             },
+        .environment_noise = gn_options_get_double(o, "room", room, "environment-noise"),
         .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
         .refuse_reference = !gn_options_get_bool(o, "room", room, "allow-reference"),
         .max_picture_width = gn_options_get_int(o, "room", room, "max-picture-width"),

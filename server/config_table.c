@@ -91,6 +91,16 @@ static const struct gn_option table[] = {
     {ROOM, .key = "light-relaxed", .type = GN_OPTION_BOOL, .default_value = "false",
      .help = "Moves importance samples by the correction table: laid out more evenly, but they "
              "move when the light changes. For light that stands still."},
+    {ROOM, .key = "light-smoothing-ms", .type = GN_OPTION_DOUBLE, .min = 0, .max = 10000,
+     .default_value = "300",
+     .help = "Time constant by which light at rest follows the environment frames, so that the "
+             "sensor's noise does not move it; what changes by more than noise is followed within "
+             "100 ms whatever is given here. 0: each frame stands alone."},
+    {ROOM, .key = "environment-noise", .type = GN_OPTION_DOUBLE, .min = 0, .max = 0.1,
+     .default_value = "0.004",
+     .help = "An environment frame that differs from the last one worked on by at most this share "
+             "of each texel's light counts as the same, and is not worked on. The default keeps "
+             "results within 1/255. 0: only frames that are the same to the byte."},
     {ROOM, .key = "ground-albedo", .type = GN_OPTION_DOUBLE, .min = 0, .max = 1,
      .default_value = "0.2",
      .help = "Reflectance of the ground that fills the half of the sphere that a fisheye does not "

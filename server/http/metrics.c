@@ -44,6 +44,23 @@ GETTER(emitter_refused)
 GETTER(holdable_fps_room)
 GETTER(light_published)
 GETTER(n_lights)
+GETTER(environment_same)
+GETTER(light_without_sh)
+GETTER(light_without_lights)
+GETTER(light_births)
+GETTER(light_deaths)
+GETTER(light_snaps)
+GETTER(light_holds)
+
+static double get_light_tau_s(const struct gn_room_figures *f)
+{
+    return 1e-3 * f->light_in_time.tau_ms;
+}
+
+static double get_n_fading(const struct gn_room_figures *f)
+{
+    return f->light_in_time.n_fading;
+}
 
 static double get_light_age_s(const struct gn_room_figures *f)
 {
@@ -71,6 +88,22 @@ static const struct metric metrics[] = {
      get_emitter_refused},
     {"gnomon_lighting_states_total", "counter", "Lighting states published.", get_light_published},
     {"gnomon_lights", "gauge", "Lights of the lighting state.", get_n_lights},
+    {"gnomon_environment_frames_same_total", "counter",
+     "Environment frames that equalled the last one worked on within the sensor's noise.",
+     get_environment_same},
+    {"gnomon_lighting_states_without_sh_total", "counter",
+     "Lighting states made without harmonics: nobody needed them.", get_light_without_sh},
+    {"gnomon_lighting_states_without_lights_total", "counter",
+     "Lighting states made without lights: nobody needed them.", get_light_without_lights},
+    {"gnomon_light_births_total", "counter", "Lights that faded in.", get_light_births},
+    {"gnomon_light_deaths_total", "counter", "Lights that faded out.", get_light_deaths},
+    {"gnomon_light_snaps_total", "counter", "Lights that took a new value at once.",
+     get_light_snaps},
+    {"gnomon_light_holds_total", "counter",
+     "Environment frames whose capture time did not rise: the light stayed.", get_light_holds},
+    {"gnomon_light_tau_seconds", "gauge",
+     "Time constant by which the last frame was followed; 0: taken as it was.", get_light_tau_s},
+    {"gnomon_lights_fading", "gauge", "Lights published that the map has no more.", get_n_fading},
     {"gnomon_lighting_age_seconds", "gauge",
      "Now minus the capture time of the lighting state; -1: no light yet.", get_light_age_s},
     {"gnomon_holdable_fps", "gauge",

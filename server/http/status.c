@@ -76,6 +76,25 @@ static json_t *make_probes(struct gn_room *room, bool *is_short)
     return list;
 }
 
+/** What was not worked out because nobody needed it, or because it was there. */
+static json_t *make_spared(const struct gn_room_figures *f)
+{
+    return json_pack("{s:I, s:I, s:I}", "same_frames", (json_int_t)f->environment_same,
+                     "states_without_sh", (json_int_t)f->light_without_sh, "states_without_lights",
+                     (json_int_t)f->light_without_lights);
+}
+
+static json_t *make_in_time(const struct gn_room_figures *f)
+{
+    static const char *const verdicts[] = {"off", "start", "follow", "hold"};
+    const struct gn_temporal_figures *t = &f->light_in_time;
+    return json_pack("{s:s, s:f, s:f, s:f, s:i, s:I, s:I, s:I, s:I}", //
+                     "verdict", verdicts[t->verdict], "dt_ms", t->dt_ms, "tau_ms", t->tau_ms,
+                     "alpha", t->alpha, "fading", t->n_fading, "births",
+                     (json_int_t)f->light_births, "deaths", (json_int_t)f->light_deaths, "snaps",
+                     (json_int_t)f->light_snaps, "holds", (json_int_t)f->light_holds);
+}
+
 static json_t *make_light(const struct gn_room_figures *f)
 {
     if (!f->has_light)
@@ -85,13 +104,15 @@ static json_t *make_light(const struct gn_room_figures *f)
                                        f->n_sh_lights, "dering_lambda", f->sh_lambda,
                                        "min_irradiance", f->sh_min)
                            : json_null();
-    return json_pack("{s:b, s:b, s:I, s:f, s:i, s:I, s:o, s:{s:f, s:f, s:f, s:f}}", //
-                     "lit", 1, "environment_frame_waiting", f->has_environment_waiting, "sequence",
-                     (json_int_t)f->light_sequence, "age_ms", get_ms_since(f->light_capture_ns),
-                     "lights", f->n_lights, "published",
-                     (json_int_t)f->light_published, //
-                     "sh", sh, "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh",
-                     f->light_ms_sh, "lights", f->light_ms_lights);
+    return json_pack(
+        "{s:b, s:b, s:I, s:f, s:i, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}, s:o, s:o}", //
+        "lit", 1, "environment_frame_waiting", f->has_environment_waiting, "sequence",
+        (json_int_t)f->light_sequence, "age_ms", get_ms_since(f->light_capture_ns), "lights",
+        f->n_lights, "published",
+        (json_int_t)f->light_published, //
+        "sh", sh, "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh", f->light_ms_sh,
+        "lights", f->light_ms_lights, "temporal", f->light_ms_temporal, "spared", make_spared(f),
+        "in_time", make_in_time(f));
 }
 
 static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)

@@ -40,7 +40,7 @@ int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int n
     s->irradiance = first->irradiance;
     s->has_lights = first->has_lights;
     s->in_time = times->in_time;
-    s->stream = times->stream;
+    s->stream = first->stream;
     s->sequence = times->sequence;
     s->capture_time_ns = times->capture_time_ns;
     s->published_time_ns = times->published_time_ns;

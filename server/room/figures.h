@@ -13,6 +13,7 @@
 
 #include "common/image.h"
 #include "proto/wire.h"
+#include "server/light/state.h"
 
 /** Upper bounds in ms of the histogram's buckets; one more bucket holds what is longer. */
 #define GN_FIGURES_BUCKETS 12
@@ -49,7 +50,11 @@ struct gn_room_figures {
     int n_sh_lights;  // small bright lights kept out of them
     double sh_lambda; // of their window; 0: none
     double sh_min;    // W/m^2, lowest luminance of their irradiance before it
-    double light_ms_map, light_ms_sh, light_ms_lights, light_ms_decode;
+    double light_ms_map, light_ms_sh, light_ms_lights, light_ms_temporal, light_ms_decode;
+    uint64_t environment_same; // frames that equalled the last one within the noise
+    uint64_t light_without_sh, light_without_lights; // states made without what nobody needed
+    struct gn_temporal_figures light_in_time;        // of the last state
+    uint64_t light_births, light_deaths, light_snaps, light_holds;
     bool has_receipt;
     int last_width, last_height;        // px, first view of the last result
     struct gn_msg_receipt last_receipt; // what was left out of it, and why, among others

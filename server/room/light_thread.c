@@ -12,6 +12,7 @@
 #include "server/room/environment.h"
 #include "server/room/lighting_message.h"
 #include "server/room/room_internal.h"
+#include "server/room/same_frame.h"
 
 GN_LOG_TOPIC("room");
 
@@ -23,8 +24,15 @@ struct subscribers {
     bool any_map, any_plain;
 };
 
+/** What of a lighting state somebody in the room can use now. */
+struct wants {
+    bool sh, lights;
+};
+
 /** What there is to do. */
 struct work {
+    struct wants wants;
+    bool is_short; // a probe's light lacks some of that
     bool has_job;
     struct gn_environment_job job;      // where has_job
     struct gn_lighting_state *previous; // a reference: the last state of the job's probe, or NULL
@@ -64,12 +72,42 @@ static void take_subscribers_locked(struct gn_room *room, bool newcomers_only,
     }
 }
 
+static struct wants get_wants_locked(const struct gn_room *room) GN_REQUIRES(room->mu)
+{
+    bool is_looked_at = room->light_asked_ns > 0 &&
+                        gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
+    return (struct wants){.sh = !room->needs.why_no_sh || room->n_subscribers > 0,
+                          .lights = !room->needs.why_no_lights || room->n_subscribers > 0 ||
+                                    is_looked_at};
+}
+
+static bool lacks(const struct gn_lighting_state *light, struct wants wants)
+{
+    return (wants.sh && !light->has_sh) || (wants.lights && !light->has_lights);
+}
+
+/** False where completing it has failed: that is tried again with the next frame only. */
+static bool is_light_short_locked(const struct gn_room *room, struct wants wants)
+    GN_REQUIRES(room->mu)
+{
+    for (int i = 0; i < GN_PROBES_MAX && !room->has_failed_to_complete; i++) {
+        const struct gn_lighting_state *light = room->probes.slots[i].light;
+        if (light && lacks(light, wants))
+            return true;
+    }
+    return false;
+}
+
 /** Waits for something to do. False: the room stops. */
 static bool wait_for_work(struct gn_room *room, struct work *out)
 {
     memset(out, 0, sizeof(*out));
     gn_mutex_lock(&room->mu);
     while (!room->is_stopping) {
+        out->wants = get_wants_locked(room);
+        out->is_short = is_light_short_locked(room, out->wants);
+        if (out->is_short)
+            break; // before anybody is told of it
         if (room->light)
             take_subscribers_locked(room, true, &out->newcomers);
         int newest;
@@ -85,7 +123,7 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
         gn_cond_wait(&room->light_wake, &room->mu);
     }
     gn_mutex_unlock(&room->mu);
-    return out->has_job || out->has_picture || out->n_lights > 0 || out->is_stale;
+    return out->has_job || out->has_picture || out->n_lights > 0 || out->is_stale || out->is_short;
 }
 
 /** Tells the sender what is wrong with its ENVIRONMENT_FRAME or EMITTER_FRAME. */
@@ -218,6 +256,19 @@ static void show_picture(struct gn_room *room, struct gn_screen_decoder *decoder
     gn_buf_unref(&job->payload);
 }
 
+/** How far each probe's light has come that is the room's now: frames may wait for it. */
+static void set_reached(struct gn_room *room, struct gn_lighting_state *const *lights, int n)
+{
+    gn_mutex_lock(&room->mu);
+    room->n_reached = n;
+    for (int i = 0; i < n; i++) {
+        room->reached[i].stream = lights[i]->stream;
+        room->reached[i].sequence = lights[i]->sequence;
+    }
+    gn_cond_signal(&room->render_wake);
+    gn_mutex_unlock(&room->mu);
+}
+
 /** Makes the light of all probes the room's, and the scene's own with it. */
 static void join_lights(struct gn_room *room)
 {
@@ -245,6 +296,7 @@ static void join_lights(struct gn_room *room)
     gn_emission_unref(&emission);
     if (rc == 0) {
         show(room, joined, n_lights);
+        set_reached(room, lights, n);
     } else {
         gn_log(GN_LOG_WARN, "room %s: the lights of %d probes not joined: %s", room->name, n,
                strerror(-rc));
@@ -252,26 +304,43 @@ static void join_lights(struct gn_room *room)
     unref_all(lights, n);
 }
 
+/** What is told of a state's making. */
+static void count_state_locked(struct gn_room *room, const struct gn_lighting_state *state,
+                               bool is_same) GN_REQUIRES(room->mu)
+{
+    struct gn_room_figures *f = &room->figures;
+    f->light_published++;
+    f->light_ms_map = state->ms_map;
+    f->has_sh = state->has_sh;
+    f->sh_order = state->irradiance.order;
+    f->n_sh_lights = state->irradiance.n_lights;
+    f->sh_lambda = state->irradiance.lambda;
+    f->sh_min = state->irradiance.min_luminance;
+    f->light_ms_sh = state->ms_sh;
+    f->light_ms_lights = state->ms_lights;
+    f->light_ms_temporal = state->ms_temporal;
+    f->environment_same += is_same;
+    f->light_without_sh += !state->has_sh;
+    f->light_without_lights += !state->has_lights;
+    f->light_in_time = state->in_time;
+    f->light_births += (uint64_t)state->in_time.n_births;
+    f->light_deaths += (uint64_t)state->in_time.n_deaths;
+    f->light_snaps += (uint64_t)state->in_time.n_snaps;
+    f->light_holds += state->in_time.verdict == GN_TEMPORAL_HOLD;
+}
+
 /** Makes the state its probe's light; takes the reference. */
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
-                    double ms_decode)
+                    double ms_decode, bool is_same)
 {
     struct subscribers subscribers;
     struct gn_lighting_state *mine = gn_lighting_state_ref(state), *old[GN_PROBES_MAX];
     int n_old;
     gn_mutex_lock(&room->mu);
     gn_probes_set_light(&room->probes, probe_id, state, gn_clock_get_monotonic_ns(), old, &n_old);
-    struct gn_room_figures *f = &room->figures;
-    f->light_published++;
-    f->light_ms_decode = ms_decode;
-    f->light_ms_map = mine->ms_map;
-    f->has_sh = mine->has_sh;
-    f->sh_order = mine->irradiance.order;
-    f->n_sh_lights = mine->irradiance.n_lights;
-    f->sh_lambda = mine->irradiance.lambda;
-    f->sh_min = mine->irradiance.min_luminance;
-    f->light_ms_sh = mine->ms_sh;
-    f->light_ms_lights = mine->ms_lights;
+    room->figures.light_ms_decode = ms_decode;
+    room->has_failed_to_complete = false;
+    count_state_locked(room, mine, is_same);
     take_subscribers_locked(room, false, &subscribers);
     gn_mutex_unlock(&room->mu);
     unref_all(old, n_old);
@@ -281,38 +350,114 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
     gn_lighting_state_unref(&mine);
 }
 
+static struct gn_light_options get_light_options(const struct gn_room *room, struct wants wants)
+{
+    struct gn_light_options options = room->options.light;
+    options.no_sh = !wants.sh;
+    options.no_lights = !wants.lights;
+    return options;
+}
+
+/** Somebody can use now what the lights there were made without. */
+static void complete_lights(struct gn_room *room, struct wants wants)
+{
+    struct gn_lighting_state *lights[GN_PROBES_MAX], *complete;
+    struct gn_light_options options = get_light_options(room, wants);
+    struct gn_error error = {0};
+    int newest;
+    gn_mutex_lock(&room->mu);
+    int n = gn_probes_get_lights(&room->probes, lights, &newest);
+    gn_mutex_unlock(&room->mu);
+    for (int i = 0; i < n; i++) {
+        if (!lacks(lights[i], wants))
+            continue;
+        int rc =
+            gn_lighting_state_complete(lights[i], &options, room->options.pool, &complete, &error);
+        if (rc < 0)
+            gn_log(GN_LOG_WARN, "room %s: light of frame %llu not completed: %s", room->name,
+                   (unsigned long long)lights[i]->sequence, error.text);
+        struct gn_lighting_state *old = NULL;
+        gn_mutex_lock(&room->mu);
+        if (rc == 0)
+            old = gn_probes_replace_light(&room->probes, lights[i], complete);
+        room->has_failed_to_complete = room->has_failed_to_complete || rc < 0;
+        gn_mutex_unlock(&room->mu);
+        gn_lighting_state_unref(&old);
+    }
+    unref_all(lights, n);
+    join_lights(room);
+}
+
+/** What the thread keeps from frame to frame. */
+struct lighter {
+    struct gn_environment_decoder *decoder; // NULL: no memory
+    struct gn_worked_frame worked[GN_PROBES_MAX];
+    int next; // of them, to be given up
+};
+
+/** The probe's last frame that was worked on, or the place for it. */
+static struct gn_worked_frame *get_worked(struct lighter *lighter, uint64_t session_id)
+{
+    for (int i = 0; i < GN_PROBES_MAX; i++) {
+        if (lighter->worked[i].job.session_id == session_id)
+            return &lighter->worked[i];
+    }
+    struct gn_worked_frame *worked = &lighter->worked[lighter->next];
+    lighter->next = (lighter->next + 1) % GN_PROBES_MAX;
+    gn_worked_frame_finish(worked);
+    return worked;
+}
+
 /** From one frame to its probe's light. previous: its last state, whose tables are used again. */
-static void make_light(struct gn_room *room, struct gn_environment_decoder *decoder,
-                       struct gn_environment_job *job, const struct gn_lighting_state *previous)
+static void make_light(struct gn_room *room, struct lighter *lighter,
+                       struct gn_environment_job *job, struct wants wants,
+                       const struct gn_lighting_state *previous)
 {
     struct gn_error error = {0};
     struct gn_environment_frame frame;
     struct gn_lighting_state *state = NULL;
+    struct gn_light_options options = get_light_options(room, wants);
+    struct gn_worked_frame *worked = get_worked(lighter, job->session_id);
     int64_t start_ns = gn_clock_get_monotonic_ns();
-    int rc = decoder ? gn_environment_decode(decoder, &job->frame, job->payload, &frame, &error)
-                     : gn_error_set(&error, -ENOMEM, "out of memory");
-    double ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
-    struct gn_light_options options = room->options.light;
+    double ms_decode = 0;
+    int rc = 0;
     options.previous = previous;
     options.stream = job->session_id;
-    if (rc == 0)
-        rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
-                                      &state, &error);
+    bool is_same = previous && previous->stream == job->session_id && !lacks(previous, wants) &&
+                   gn_worked_frame_is_same(worked, job, room->options.environment_noise);
+    if (is_same) {
+        rc = gn_lighting_state_advance(previous, job->frame.sequence, job->frame.capture_time_ns,
+                                       &options, &state);
+        if (rc < 0)
+            (void)gn_error_set(&error, rc, "out of memory");
+    } else {
+        rc = lighter->decoder ? gn_environment_decode(lighter->decoder, &job->frame, job->payload,
+                                                      &frame, &error)
+                              : gn_error_set(&error, -ENOMEM, "out of memory");
+        ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
+        if (rc == 0)
+            rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
+                                          &state, &error);
+        if (rc == 0)
+            gn_worked_frame_keep(worked, job);
+    }
     if (rc < 0)
         refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, rc,
                error.text);
     else
-        publish(room, job->session_id, state, ms_decode);
+        publish(room, job->session_id, state, ms_decode, is_same);
     gn_buf_unref(&job->payload);
 }
 
 void gn_room_run_light(void *context)
 {
     struct gn_room *room = context;
-    struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
+    struct lighter lighter = {.decoder = calloc(1, sizeof(*lighter.decoder))};
     struct gn_screen_decoder screen_decoder = {0};
     struct work work;
     while (wait_for_work(room, &work)) {
+        if (work.is_short)
+            complete_lights(room, work.wants);
         if (work.is_stale)
             join_lights(room);
         for (int i = 0; i < work.n_lights; i++)
@@ -321,11 +466,13 @@ void gn_room_run_light(void *context)
         if (work.has_picture)
             show_picture(room, &screen_decoder, &work.picture);
         if (work.has_job)
-            make_light(room, decoder, &work.job, work.previous);
+            make_light(room, &lighter, &work.job, work.wants, work.previous);
         gn_lighting_state_unref(&work.previous);
     }
     gn_screen_decoder_finish(&screen_decoder);
-    if (decoder)
-        gn_environment_decoder_finish(decoder);
-    free(decoder);
+    for (int i = 0; i < GN_PROBES_MAX; i++)
+        gn_worked_frame_finish(&lighter.worked[i]);
+    if (lighter.decoder)
+        gn_environment_decoder_finish(lighter.decoder);
+    free(lighter.decoder);
 }

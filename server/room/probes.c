@@ -111,6 +111,21 @@ void gn_probes_set_light(struct gn_probes *probes, uint64_t session_id,
     }
 }
 
+struct gn_lighting_state *gn_probes_replace_light(struct gn_probes *probes,
+                                                  const struct gn_lighting_state *old,
+                                                  struct gn_lighting_state *light)
+{
+    for (int i = 0; i < GN_PROBES_MAX; i++) {
+        struct gn_probe *p = &probes->slots[i];
+        if (p->light == old) {
+            struct gn_lighting_state *replaced = p->light;
+            p->light = light;
+            return replaced;
+        }
+    }
+    return light;
+}
+
 struct gn_lighting_state *gn_probes_leave(struct gn_probes *probes, uint64_t session_id)
 {
     struct gn_probe *p = find(probes, session_id);

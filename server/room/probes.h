@@ -65,6 +65,12 @@ bool gn_probes_has_frame(const struct gn_probes *probes);
 void gn_probes_set_light(struct gn_probes *probes, uint64_t session_id,
                          struct gn_lighting_state *light, int64_t now_ns,
                          struct gn_lighting_state *out_old[static GN_PROBES_MAX], int *out_n);
+/** Another state of the same frame takes the old one's place, and its reference. Returns what is
+ * the caller's to unref: the old one, or, where the old one is no probe's light any more, the
+ * other. */
+struct gn_lighting_state *gn_probes_replace_light(struct gn_probes *probes,
+                                                  const struct gn_lighting_state *old,
+                                                  struct gn_lighting_state *light);
 /** The session has ended. Where other probes have lit the room its frame and light go, and the
  * light is the caller's to unref; else they stay, and NULL is returned. */
 struct gn_lighting_state *gn_probes_leave(struct gn_probes *probes, uint64_t session_id);

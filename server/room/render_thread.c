@@ -19,6 +19,23 @@ struct turn {
     bool is_looked_at;
 };
 
+/**
+ * The sequence that frames may wait for: each probe counts its own, and the one that began last is
+ * meant, a replay's say. While it has not lit the room, no sequence has been reached; where it has
+ * left without doing so, any light's counts.
+ */
+static uint64_t get_light_sequence_locked(struct gn_room *room) GN_REQUIRES(room->mu)
+{
+    const struct gn_lighting_state *light = room->light;
+    if (!light)
+        return 0;
+    for (int i = 0; i < room->n_reached; i++) {
+        if (room->reached[i].stream == room->newest_probe)
+            return room->reached[i].sequence;
+    }
+    return gn_room_find_locked(room, room->newest_probe) ? 0 : light->sequence;
+}
+
 /** Waits for a frame whose turn it is. False: the room stops. */
 static bool wait_for_turn(struct gn_room *room, struct turn *out)
 {
@@ -28,8 +45,7 @@ static bool wait_for_turn(struct gn_room *room, struct turn *out)
     gn_mutex_lock(&room->mu);
     while (!room->is_stopping) {
         int64_t now_ns = gn_clock_get_monotonic_ns(), deadline_ns;
-        struct gn_scheduler_light light = {room->light != NULL,
-                                           room->light ? room->light->sequence : 0};
+        struct gn_scheduler_light light = {room->light != NULL, get_light_sequence_locked(room)};
         out->verdict = gn_scheduler_take(room->scheduler, now_ns, light, &out->job, &deadline_ns);
         if (out->verdict != GN_SCHEDULER_NOTHING) {
             out->light = room->light ? gn_lighting_state_ref(room->light) : NULL;

@@ -66,6 +66,7 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
     room->figures.n_virtual_triangles = room->scene->n_virtual_triangles;
     if (room->scene->model == GN_MODEL_GLOBAL)
         room->options.map.model = room->scene;
+    gn_render_get_needs(room->scene, &room->options.render, &room->needs);
     rc = gn_frame_maker_create(&room->options, room->scene, &room->maker, &scene_error);
     if (rc < 0) {
         gn_error_set(out_error, rc, "room %s: %s", room->name, scene_error.text);
@@ -359,6 +360,7 @@ int gn_room_put_environment(struct gn_room_session *session,
                             "ENVIRONMENT_FRAME sequence %llu is not above the last one, %llu",
                             (unsigned long long)frame->sequence,
                             (unsigned long long)session->last_environment_sequence);
+    bool is_first = session->last_environment_sequence == 0;
     session->last_environment_sequence = frame->sequence;
     if (frame->width > (uint32_t)o->max_environment_width ||
         frame->height > (uint32_t)o->max_environment_height)
@@ -371,6 +373,8 @@ int gn_room_put_environment(struct gn_room_session *session,
     gn_mutex_lock(&room->mu);
     room->figures.environment_in++;
     session->figures.environment_in++;
+    if (is_first)
+        room->newest_probe = session->id;
     int rc = gn_probes_put(&room->probes, &job, &superseded);
     room->figures.environment_superseded += rc == 1;
     room->figures.environment_refused += rc < 0;

@@ -24,11 +24,13 @@
 
 /** What a room is made from. Copied. */
 struct gn_room_options {
-    const char *name;                          // [1, 63] bytes
-    const char *node;                          // the server's name, for LIGHTING_STATE
-    const char *scene_path;                    // of scene.json
-    struct gn_light_options light;             // all-zero: defaults
-    struct gn_radiance_map_options map;        // all-zero: defaults
+    const char *name;                   // [1, 63] bytes
+    const char *node;                   // the server's name, for LIGHTING_STATE
+    const char *scene_path;             // of scene.json
+    struct gn_light_options light;      // all-zero: defaults
+    struct gn_radiance_map_options map; // all-zero: defaults
+    double environment_noise; // share by which radiance may differ in a frame that counts as the
+                              // same, [0, 0.1]; 0: frames that are the same to the byte
     struct gn_render_options render;           // quality and seed are each frame's own
     bool encoded_multiply;                     // the paper's composite: the factor scales codes
     bool refuse_reference;                     // frames of reference quality are dropped

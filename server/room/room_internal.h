@@ -45,6 +45,7 @@ struct gn_room {
     char name[64];
     char node[64];
     struct gn_scene *scene;       // owned, immutable
+    struct gn_render_needs needs; // what its frames use of a lighting state
     struct gn_frame_maker *maker; // owner: render thread while it runs
     struct gn_emitters *emitters; // owned; owner: light thread while it runs
     struct gn_thread light_thread;
@@ -61,7 +62,13 @@ struct gn_room {
     struct gn_screens screens;
     bool is_light_stale;             // a probe has left: the others' lights are to be joined anew;
                                      // or the scene's own light is not shown yet
+    bool has_failed_to_complete;     // a light that lacks what somebody could use stays as it is
+    uint64_t newest_probe;           // the session whose first environment frame came last
     struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
+    int n_reached;                   // probes whose light is in `light`
+    struct {
+        uint64_t stream, sequence;
+    } reached[GN_PROBES_MAX];
     int64_t light_asked_ns, composite_asked_ns; // when the page last looked; 0: never
     struct gn_snapshot *composite;              // a reference; NULL: nobody looks
     struct gn_room_figures figures;
