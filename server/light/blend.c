@@ -108,3 +108,24 @@ void gn_blend_get_radiance(const struct gn_blend *blend, const float point[stati
     for (int c = 0; c < 3; c++)
         out_radiance[c] = (float)sum[c];
 }
+
+bool gn_blend_get_radiance_at(const struct gn_blend *blend, const float point[static 3],
+                              float out_radiance[static 3])
+{
+    double weights[GN_PROBES_MAX], sum[3] = {0}, seen = 0;
+    bool is_seen = false;
+    gn_blend_get_weights(blend, point, weights);
+    for (int i = 0; i < blend->n; i++) {
+        float radiance[3];
+        if (!gn_radiance_map_get_radiance_at(blend->state[i]->map, point, radiance))
+            continue;
+        double weight = fmax(weights[i], 1e-12); // a lone one's light whatever it weighs
+        is_seen = true;
+        seen += weight;
+        for (int c = 0; c < 3; c++)
+            sum[c] += weight * (double)radiance[c];
+    }
+    for (int c = 0; c < 3 && is_seen; c++)
+        out_radiance[c] = (float)(sum[c] / seen);
+    return is_seen;
+}

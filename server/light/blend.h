@@ -35,5 +35,9 @@ void gn_blend_get_weights(const struct gn_blend *blend, const float point[static
  * maps, weighted. One probe: its map's own bits. */
 void gn_blend_get_radiance(const struct gn_blend *blend, const float point[static 3],
                            const float dir_world[static 3], float out_radiance[static 3]);
+/** Radiance[3] that probes measured of a point on a modelled real surface (global model): of those
+ * that see it, by their weights there. False, and nothing is written: none does. */
+bool gn_blend_get_radiance_at(const struct gn_blend *blend, const float point[static 3],
+                              float out_radiance[static 3]);
 
 #endif

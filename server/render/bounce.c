@@ -84,6 +84,17 @@ static void add_radiance(const struct walk *walk, const double radiance[static 3
         sums[walk->is_touched][k] += walk->through[k] * radiance[k];
 }
 
+/** Direct light at the walk's vertex, by one modelled surface that a probe sees. */
+static void try_place(const struct frame *frame, const struct walk *walk, enum gn_rt_set set,
+                      uint64_t *random, double sums[static 2][3], uint64_t *rays)
+{
+    double radiance[3];
+    gn_places_try(frame, &walk->surface, walk->org, set, next_unit(random), radiance, rays);
+    for (int k = 0; k < 3; k++)
+        radiance[k] *= walk->surface.albedo[k] / M_PI;
+    add_radiance(walk, radiance, sums);
+}
+
 /** Direct light at the walk's vertex, by one light. */
 static void try_light(const struct frame *frame, const struct walk *walk, enum gn_rt_set set,
                       uint64_t *random, double sums[static 2][3], uint64_t *rays)
@@ -144,6 +155,15 @@ static bool step(const struct frame *frame, struct walk *walk, enum gn_rt_set se
         return false;
     }
     gn_scene_get_surface(frame->scene, walk->dir, &hit, &walk->surface);
+    float pinned[3];
+    if (walk->surface.role == GN_RT_REAL && frame->places->n > 0 &&
+        gn_blend_get_radiance_at(&frame->blend, walk->surface.point, pinned)) {
+        // What the probe sees is among the lights that were tried, but not from a mirror.
+        const double wide[3] = {pinned[0], pinned[1], pinned[2]};
+        if (walk->is_specular)
+            add_radiance(walk, wide, sums);
+        return false;
+    }
     const struct gn_surface *surface = &walk->surface;
     gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
                         surface->normal_geometric, walk->org);
@@ -184,6 +204,8 @@ static void take_walk(const struct frame *frame, const struct sample *start, enu
             try_light(frame, &walk, set, &random, sums, rays);
         if (!walk.is_specular && frame->near.cdf)
             try_near(frame, &walk, set, &random, sums, rays);
+        if (!walk.is_specular && frame->places->n > 0)
+            try_place(frame, &walk, set, &random, sums, rays);
     }
 }
 

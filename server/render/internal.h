@@ -103,6 +103,23 @@ struct light_list {
     struct direction_boxes *group_boxes; // of the groups, 16 together
 };
 
+/** A piece of a modelled real surface that the probe sees (places.c). */
+struct place {
+    float position[3];  // m, world
+    float normal[3];    // unit, to the probe's side
+    float intensity[3]; // W/sr along the normal
+    float radius2;      // m^2, of the disc of equal area
+};
+
+/** What the reference's covered texels are in the global model. */
+struct places {
+    int n;
+    int64_t capacity;
+    int ends[GN_PROBES_MAX]; // of each probe's
+    struct place *lights;    // [n], owned
+    double *cdf;             // [n] of luminance, rising to 1; for walks
+};
+
 /** Some triangles that are near each other. */
 struct cluster {
     struct box box;               // exact
@@ -193,6 +210,8 @@ struct scratch {
     // objects hide light i from the sample at hand.
     uint16_t *cut_texels, *hidden_texels; // [n_texel_blocks]
     int n_texel_blocks;
+    uint8_t *cut_places, *hidden_places; // [n_places] the same for the places; 0 or 1
+    int n_places;
     struct seen_cluster near[2 * MAX_CLUSTERS]; // those above the sample's horizon
     struct outline outlines[MAX_OUTLINES];
     struct change changes[MAX_OUTLINES + 2 * MAX_CLUSTERS]; // in 16 groups of directions
@@ -229,6 +248,7 @@ struct frame {
     float margin;                    // m, by which boxes are widened
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
     struct near_lights near;         // of the state; reference: finer
+    const struct places *places;     // reference in the global model; else none
     double floor_irradiance[3];      // sums up to this are no light (1e-6 of all)
     float floor_radiance;            // radiances below this do not make contrast
 
@@ -341,7 +361,33 @@ void gn_directions_split(const struct direction_boxes *boxes, const float n[stat
 
 /** Fills list from the whole map of each probe: every texel, bright ones in parts, and what it does
  * not show. No 16 groups are of two probes. */
-GN_MUST_USE int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list);
+GN_MUST_USE int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list,
+                                         struct places *places);
+
+/* places.c */
+
+/** Empties the list. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_places_reserve(struct places *places, int64_t capacity);
+void gn_places_finish(struct places *places);
+/** Adds what the map's probe sees in a unit direction, of irradiance across it. False: it sees no
+ * modelled surface there; nothing is added. */
+bool gn_places_add(struct places *places, const struct gn_radiance_map *map,
+                   const double dir[static 3], double solid_angle,
+                   const double irradiance[static 3]);
+/** After the last: fills cdf. */
+void gn_places_fill_cdf(struct places *places);
+/** Irradiance of a surface by one place, chosen by `random` [0, 1), over its probability. */
+void gn_places_try(const struct frame *frame, const struct gn_surface *surface,
+                   const float org[static 3], enum gn_rt_set set, double random,
+                   double out_irradiance[static 3], uint64_t *rays);
+/** Marks those that the set hides from the sample. True where there is one. */
+bool gn_places_find_hidden(const struct frame *frame, struct scratch *scratch,
+                           const struct sample *s, enum gn_rt_set set, uint8_t *hidden,
+                           uint64_t *rays);
+/** Adds what those send that hidden does not mark to sums[0], and of that what cut marks to
+ * sums[1]; even: without the surface's cosine. */
+void gn_places_sum(const struct frame *frame, const struct sample *s, const uint8_t *hidden,
+                   const uint8_t *cut, bool even, double sums[static 2][3]);
 
 /* reference.c */
 

@@ -98,7 +98,7 @@ static const char *why_not_light_loop(const struct frame *frame)
         return NULL;
     if (options->shading == GN_SHADING_IRRADIANCE && options->quality != GN_QUALITY_REFERENCE)
         return "irradiance shading needs no loop over lights";
-    if (frame->lights->n == 0)
+    if (frame->lights->n + frame->places->n == 0)
         return "no light";
     return NULL;
 }
@@ -109,9 +109,9 @@ static const char *why_not_shadow(const struct frame *frame)
         return "the scene has no virtual object";
     if (!frame->has_real)
         return "the scene has no real object to receive one";
-    if (frame->lights->n == 0 && frame->near.n == 0)
+    if (frame->lights->n + frame->places->n + frame->near.n == 0)
         return "no light";
-    if (!frame->run_bounces && !can_any_light_cast(frame))
+    if (!frame->run_bounces && frame->places->n == 0 && !can_any_light_cast(frame))
         return "no light throws a shadow of a virtual object onto a real one";
     return NULL;
 }

@@ -314,17 +314,34 @@ static void sum_lights(const struct frame *frame, const struct scratch *scratch,
             sums[i / 3][i % 3] +=
                 part[i / 3][i % 3] * (frame->blend.n > 1 ? (double)s->weights[p] : 1);
     }
+    if (frame->places->n > 0)
+        gn_places_sum(frame, s, scratch->hidden_places, scratch->cut_places, even, sums);
 }
 
-static void clear_masks(const struct frame *frame, uint16_t *masks)
+/** Nothing is hidden, or cut. */
+static void clear_masks(const struct frame *frame, uint16_t *texels, uint8_t *places)
 {
-    memset(masks, 0, (size_t)frame->lights->n / LANES * sizeof(*masks));
+    memset(texels, 0, (size_t)frame->lights->n / LANES * sizeof(*texels));
+    if (frame->places->n > 0)
+        memset(places, 0, (size_t)frame->places->n);
+}
+
+/** Marks what the set hides of all light. True where there is some. */
+static bool find_all_hidden(const struct frame *frame, struct scratch *scratch,
+                            const struct sample *s, enum gn_rt_set set, bool is_cut, uint64_t *rays)
+{
+    bool found = find_hidden(frame, scratch, s, set,
+                             is_cut ? scratch->cut_texels : scratch->hidden_texels, rays);
+    if (frame->places->n > 0)
+        found |= gn_places_find_hidden(frame, scratch, s, set,
+                                       is_cut ? scratch->cut_places : scratch->hidden_places, rays);
+    return found;
 }
 
 void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                         struct tile_figures *figures)
 {
-    clear_masks(frame, scratch->cut_texels);
+    clear_masks(frame, scratch->cut_texels, scratch->cut_places);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
@@ -332,8 +349,7 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
         double sums[2][3] = {{0}};
         double common[3] = {0};
         double touched[3] = {0};
-        (void)find_hidden(frame, scratch, s, GN_RT_ALL, scratch->hidden_texels,
-                          &figures->rays_shade);
+        (void)find_all_hidden(frame, scratch, s, GN_RT_ALL, false, &figures->rays_shade);
         sum_lights(frame, scratch, s, false, sums);
         if (frame->run_bounces)
             gn_bounce_gather(frame, s, GN_RT_ALL, n_paths, common, touched, &figures->rays_shade);
@@ -371,9 +387,9 @@ static void sum_receiver(const struct frame *frame, struct scratch *scratch, str
     double sums[2][3] = {{0}};
     uint64_t rays = 0;
     if (frame->run_blockers)
-        (void)find_hidden(frame, scratch, s, GN_RT_REAL, scratch->hidden_texels, &rays);
+        (void)find_all_hidden(frame, scratch, s, GN_RT_REAL, false, &rays);
     else
-        clear_masks(frame, scratch->hidden_texels);
+        clear_masks(frame, scratch->hidden_texels, scratch->hidden_places);
     sum_lights(frame, scratch, s, frame->options.shadow_unweighted, sums);
     figures->rays_shadow += rays;
     figures->n_rays_real += rays;
@@ -396,8 +412,7 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
         gn_shadow_clear(s);
         if (!s->is_receiver)
             continue;
-        s->is_cut = find_hidden(frame, scratch, s, GN_RT_VIRTUAL, scratch->cut_texels,
-                                &figures->rays_shadow);
+        s->is_cut = find_all_hidden(frame, scratch, s, GN_RT_VIRTUAL, true, &figures->rays_shadow);
         if (!s->is_cut && frame->near.n_real > 0)
             s->is_cut = gn_near_reference_is_cut(frame, s, figures);
         if (s->is_cut || frame->run_bounces)
@@ -405,7 +420,7 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
     }
     // The rest of a pixel that loses light somewhere: what it weighs in the pixel's ratio.
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
-    clear_masks(frame, scratch->cut_texels);
+    clear_masks(frame, scratch->cut_texels, scratch->cut_places);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (!groups[s->group] || s->is_summed || s->kind == SAMPLE_VIRTUAL)

@@ -93,12 +93,25 @@ static int count_parts(const double irradiance[static 3], double total)
     return share > SHARE_4X4 ? 4 : share > SHARE_2X2 ? 2 : 1;
 }
 
+/** From the modelled surface that the probe sees there, or else from far off. */
+static void add_light(const struct gn_radiance_map *map, const double dir[static 3],
+                      double solid_angle, const double irradiance[static 3],
+                      struct light_list *list, struct places *places)
+{
+    if (!gn_places_add(places, map, dir, solid_angle, irradiance)) {
+        gn_render_lights_add(list, dir, irradiance);
+        return;
+    }
+    for (int k = 0; k < 3; k++)
+        list->total[k] += irradiance[k];
+}
+
 /** Adds a part of a texel, or all of it: a square around `centre` (unit, world) that has a share of
  * the texel's irradiance where its moment is not known or makes no sense (corners outside, a rim
  * that is one direction). */
 static void add_part(const struct gn_radiance_map *map, size_t texel, const double corner[static 2],
                      double side, const double centre[static 3], double solid_angle,
-                     struct light_list *list)
+                     struct light_list *list, struct places *places)
 {
     double dir[3] = {centre[0], centre[1], centre[2]};
     double length = solid_angle;
@@ -114,12 +127,12 @@ static void add_part(const struct gn_radiance_map *map, size_t texel, const doub
     double irradiance[3];
     for (size_t k = 0; k < 3; k++)
         irradiance[k] = length * (double)map->radiance.data[3 * texel + k];
-    gn_render_lights_add(list, dir, irradiance);
+    add_light(map, dir, solid_angle, irradiance, list, places);
 }
 
 /** Adds texel (x, y) in n x n parts, those that the map shows. */
 static void add_texel(const struct gn_radiance_map *map, int x, int y, int n,
-                      struct light_list *list)
+                      struct light_list *list, struct places *places)
 {
     size_t texel = (size_t)y * (size_t)map->radiance.width + (size_t)x;
     double centres[16][3];
@@ -144,13 +157,13 @@ static void add_texel(const struct gn_radiance_map *map, int x, int y, int n,
     }
     for (int part = 0; part < n_shown; part++)
         add_part(map, texel, corners[part], 1.0 / n, centres[part],
-                 (double)map->solid_angle[texel] / n_shown, list);
+                 (double)map->solid_angle[texel] / n_shown, list, places);
 }
 
 /** The lights of a square of 4 x 4 texels, a block; or those of its texels that are cut, a block
  * each. */
 static void add_square(const struct gn_radiance_map *map, int x0, int y0, double total, bool is_cut,
-                       struct light_list *list)
+                       struct light_list *list, struct places *places)
 {
     for (int i = 0; i < 16; i++) {
         int x = x0 + i % 4;
@@ -163,9 +176,9 @@ static void add_square(const struct gn_radiance_map *map, int x0, int y0, double
             continue;
         int n = count_parts(irradiance, total);
         if (n == 1 && !is_cut) {
-            add_texel(map, x, y, 1, list);
+            add_texel(map, x, y, 1, list, places);
         } else if (n > 1 && is_cut) {
-            add_texel(map, x, y, n, list);
+            add_texel(map, x, y, n, list, places);
             gn_render_lights_pad(list, LANES);
         }
     }
@@ -174,12 +187,13 @@ static void add_square(const struct gn_radiance_map *map, int x0, int y0, double
 
 /** All texels, in squares of 4 x 4 and those in squares of 16 x 16, which are groups. */
 static void add_texels(const struct gn_radiance_map *map, double total, bool is_cut,
-                       struct light_list *list)
+                       struct light_list *list, struct places *places)
 {
     for (int y = 0; y < map->radiance.height; y += 16) {
         for (int x = 0; x < map->radiance.width; x += 16) {
             for (int square = 0; square < 16; square++)
-                add_square(map, x + square % 4 * 4, y + square / 4 * 4, total, is_cut, list);
+                add_square(map, x + square % 4 * 4, y + square / 4 * 4, total, is_cut, list,
+                           places);
             if (!is_cut)
                 gn_render_lights_pad(list, GROUP);
         }
@@ -189,7 +203,7 @@ static void add_texels(const struct gn_radiance_map *map, double total, bool is_
 
 /** Adds a cell of what the map does not show; scale 0: only its solid angle counts. */
 static double add_cell(const struct gn_radiance_map *map, int ring, int sector, double scale,
-                       struct light_list *list)
+                       struct light_list *list, struct places *places)
 {
     bool is_beyond = ring >= FILL_RINGS; // the rim
     double rim = cos(map->projection.theta_max);
@@ -206,12 +220,14 @@ static double add_cell(const struct gn_radiance_map *map, int ring, int sector, 
     for (int k = 0; k < 3; k++)
         irradiance[k] = map->fill[k] * cell * scale;
     gn_pose_rotate(&map->world_from_probe, dir, dir);
-    gn_render_lights_add(list, dir, irradiance);
+    if (scale > 0)
+        add_light(map, dir, cell * scale, irradiance, list, places);
     return cell;
 }
 
 /** Cells of the sphere that the map does not show, theta from the optical axis; as the texels. */
-static void add_fill(const struct gn_radiance_map *map, struct light_list *list)
+static void add_fill(const struct gn_radiance_map *map, struct light_list *list,
+                     struct places *places)
 {
     // Two rounds: the cells' solid angles add up to the map's own figure of what is not shown.
     double scale = 0;
@@ -224,7 +240,7 @@ static void add_fill(const struct gn_radiance_map *map, struct light_list *list)
             int groups_x = FILL_SECTORS / 16;
             int ring = group / groups_x * 16 + block / 4 * 4 + lane / 4;
             int sector = group % groups_x * 16 + block % 4 * 4 + lane % 4;
-            sum += add_cell(map, ring, sector, scale, list);
+            sum += add_cell(map, ring, sector, scale, list, places);
             if (lane == LANES - 1)
                 gn_render_lights_pad(list, LANES);
             if (block == LANES - 1 && lane == LANES - 1)
@@ -262,7 +278,8 @@ static int64_t get_capacity(const struct gn_radiance_map *map)
            (has_fill(map) ? 2 * FILL_RINGS * FILL_SECTORS : 0);
 }
 
-static void add_map(const struct gn_radiance_map *map, struct light_list *list)
+static void add_map(const struct gn_radiance_map *map, struct light_list *list,
+                    struct places *places)
 {
     double total[3] = {0};
     for (size_t i = 0; i < (size_t)map->radiance.width * (size_t)map->radiance.height; i++) {
@@ -272,26 +289,34 @@ static void add_map(const struct gn_radiance_map *map, struct light_list *list)
             total[k] += irradiance[k];
     }
     double luminance = get_luminance(total);
-    add_texels(map, luminance, false, list);
-    add_texels(map, luminance, true, list);
+    add_texels(map, luminance, false, list, places);
+    add_texels(map, luminance, true, list, places);
     if (has_fill(map))
-        add_fill(map, list);
+        add_fill(map, list, places);
 }
 
-int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list)
+int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list,
+                             struct places *places)
 {
     int64_t capacity = 0;
-    for (int i = 0; i < blend->n; i++)
+    bool is_global = false;
+    for (int i = 0; i < blend->n; i++) {
         capacity += get_capacity(blend->state[i]->map) + (blend->n > 1 ? GROUP * LANES : 0);
+        is_global |= blend->state[i]->map->geometry != NULL;
+    }
     int ret = gn_render_lights_reserve(list, capacity);
+    if (ret == 0)
+        ret = gn_places_reserve(places, is_global ? capacity : 0);
     if (ret < 0)
         return ret;
     for (int i = 0; i < blend->n; i++) {
-        add_map(blend->state[i]->map, list);
+        add_map(blend->state[i]->map, list, places);
         gn_render_lights_pad(list, blend->n > 1 ? GROUP * LANES : GROUP);
         list->ends[i] = list->n;
+        places->ends[i] = places->n;
     }
     gn_directions_fill_groups(list);
     fill_cdf(list);
+    gn_places_fill_cdf(places);
     return 0;
 }

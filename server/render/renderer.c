@@ -25,6 +25,7 @@ struct gn_renderer {
     struct scratch *scratches; // [n_workers], owned
     struct light_list lights;
     struct near_store near;
+    struct places places;
     size_t n_pixels; // capacity of what follows
     float *rays;     // [h][w][3], owned
     struct feature *features;
@@ -73,13 +74,16 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     *renderer = NULL;
     if (!self)
         return;
-    for (int i = 0; i < self->n_workers && self->scratches; i++)
+    for (int i = 0; i < self->n_workers && self->scratches; i++) {
         free(self->scratches[i].cut_texels);
+        free(self->scratches[i].cut_places);
+    }
     free(self->scratches);
     for (int i = 0; i < 2; i++)
         gn_clusters_finish(&self->clusters[i]);
     gn_render_lights_finish(&self->lights);
     gn_near_store_finish(&self->near);
+    gn_places_finish(&self->places);
     free(self->rays);
     free(self->features);
     free(self->figures);
@@ -152,6 +156,24 @@ static const char *check_light(const struct gn_scene *scene, const struct gn_ble
                    "leaves out";
     }
     return NULL;
+}
+
+static int reserve_places(struct gn_renderer *renderer)
+{
+    int n = renderer->places.n;
+    for (int i = 0; i < renderer->n_workers; i++) {
+        struct scratch *scratch = &renderer->scratches[i];
+        if (scratch->n_places >= n)
+            continue;
+        free(scratch->cut_places);
+        scratch->n_places = 0;
+        scratch->cut_places = malloc(2 * (size_t)n);
+        if (!scratch->cut_places)
+            return -ENOMEM;
+        scratch->hidden_places = scratch->cut_places + n;
+        scratch->n_places = n;
+    }
+    return 0;
 }
 
 static int check_request(const struct gn_scene *scene, const struct gn_camera *camera,
@@ -415,6 +437,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->rt = renderer->scene->rt;
     frame->rays = renderer->rays;
     frame->lights = &renderer->lights;
+    frame->places = &renderer->places;
     frame->features = renderer->features;
     frame->figures = renderer->figures;
     frame->scratches = renderer->scratches;
@@ -468,7 +491,7 @@ static void fill_report(const struct frame *frame, int n_workers, struct gn_rend
     report->rays_mirror = sum.rays_mirror;
     report->rays_shade = sum.rays_shade;
     report->rays_shadow = sum.rays_shadow;
-    report->n_lights = frame->lights->n_lit + frame->near.n;
+    report->n_lights = frame->lights->n_lit + frame->places->n + frame->near.n;
     report->n_virtual_pixels = sum.n_virtual_pixels;
     report->n_shadow_pixels = sum.n_shadow_pixels;
     report->n_refined_pixels = sum.n_refined_pixels;
@@ -493,11 +516,15 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     }
     ret = reserve_pixels(renderer, camera->width, camera->height);
     if (ret == 0)
+        ret = gn_places_reserve(&renderer->places, 0);
+    if (ret == 0)
         ret = quality == GN_QUALITY_REFERENCE
-                  ? gn_reference_make_lights(blend, &renderer->lights)
+                  ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
                   : gn_render_lights_from_blend(blend, &renderer->lights);
     if (ret == 0 && quality == GN_QUALITY_REFERENCE)
         ret = reserve_texels(renderer);
+    if (ret == 0 && quality == GN_QUALITY_REFERENCE)
+        ret = reserve_places(renderer);
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
     update_rays(renderer, camera);

@@ -46,6 +46,14 @@ static void follow_mirrors(const struct frame *frame, struct sample *s,
             return;
         }
         gn_scene_get_surface(frame->scene, dir, &hit, &s->surface);
+        float pinned[3];
+        if (s->surface.role == GN_RT_REAL && s->surface.material == GN_MATERIAL_DIFFUSE &&
+            gn_blend_get_radiance_at(&frame->blend, s->surface.point, pinned)) {
+            for (int k = 0; k < 3; k++)
+                s->radiance[k] = (double)s->through[k] * pinned[k];
+            s->is_lit = false;
+            return;
+        }
         gn_rt_offset_origin(s->surface.point, s->surface.normal_geometric, s->surface.clearance,
                             s->surface.normal_geometric, s->org);
     }
