@@ -123,6 +123,23 @@ int gn_cmd_keep_clock(struct gn_client *client, int64_t *measured_ns, struct gn_
     return err && err != -ETIMEDOUT ? gn_cmd_set_fault(client, err, out_error) : 0;
 }
 
+int gn_cmd_serve_until(struct gn_client *client, int64_t *clock_ns, int64_t due_ns,
+                       struct gn_error *out_error)
+{
+    for (;;) {
+        if (gn_cmd_is_interrupted())
+            return -EINTR;
+        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
+        struct gn_client_event event;
+        int got = gn_client_poll(client, timeout_ms, &event);
+        int err = got < 0   ? gn_cmd_set_fault(client, got, out_error)
+                  : got > 0 ? gn_cmd_take_event(&event, out_error)
+                            : gn_cmd_keep_clock(client, clock_ns, out_error);
+        if (err || (got == 0 && timeout_ms == 0))
+            return err;
+    }
+}
+
 int gn_cmd_get_timeout_ms(int64_t due_ns)
 {
     int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();

@@ -16,6 +16,7 @@
 
 /** argv[0] is the command's name. Each returns the process's exit status. */
 int gn_cmd_probe(int argc, char *const argv[]);
+int gn_cmd_screen(int argc, char *const argv[]);
 int gn_cmd_view(int argc, char *const argv[]);
 int gn_cmd_doctor(int argc, char *const argv[]);
 
@@ -37,7 +38,7 @@ int gn_cmd_doctor(int argc, char *const argv[]);
         .help = "The secret that the server asks for, if it does; gnomond 0.1 knows none."         \
     }
 
-/** Rows of the option table that every command which replays pictures has. */
+/** Rows of the option table that every command which replays recordings has. */
 #define GN_CMD_REPLAY_OPTIONS                                                                      \
     {.key = "sequence",                                                                            \
      .flag = "sequence",                                                                           \
@@ -50,14 +51,18 @@ int gn_cmd_doctor(int argc, char *const argv[]);
          .value_name = "PATTERN",                                                                  \
          .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
                  "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
-        {.key = "rate",                                                                            \
-         .flag = "rate",                                                                           \
-         .type = GN_OPTION_DOUBLE,                                                                 \
-         .min = 0.001,                                                                             \
-         .max = 1000,                                                                              \
-         .value_name = "HZ",                                                                       \
-         .help = "Pictures per second. Without it a sequence keeps its own times; files go at "    \
-                 "10. Up to 2 s late a replay catches up; beyond, the rest is shifted and said."}, \
+        GN_CMD_PACE_OPTIONS
+
+/** Rows of the option table that every command which replays pictures has. */
+#define GN_CMD_PACE_OPTIONS                                                                        \
+    {.key = "rate",                                                                                \
+     .flag = "rate",                                                                               \
+     .type = GN_OPTION_DOUBLE,                                                                     \
+     .min = 0.001,                                                                                 \
+     .max = 1000,                                                                                  \
+     .value_name = "HZ",                                                                           \
+     .help = "Pictures per second. Without it a sequence keeps its own times; files go at "        \
+             "10. Up to 2 s late a replay catches up; beyond, the rest is shifted and said."},     \
         {.key = "start-at",                                                                        \
          .flag = "start-at",                                                                       \
          .type = GN_OPTION_DOUBLE,                                                                 \
@@ -111,6 +116,15 @@ GN_MUST_USE int gn_cmd_take_event(const struct gn_client_event *event, struct gn
  * sentence: the connection is lost. */
 GN_MUST_USE int gn_cmd_keep_clock(struct gn_client *client, int64_t *measured_ns,
                                   struct gn_error *out_error);
+
+/** How long the server's word on the last picture is waited for. */
+#define GN_CMD_LAST_WORDS_NS (200 * INT64_C(1000000))
+/**
+ * Serves a connection on which nothing but trouble is expected, and its clock, until the time has
+ * come. Returns 0, -EINTR (Ctrl-C), or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_cmd_serve_until(struct gn_client *client, int64_t *clock_ns, int64_t due_ns,
+                                   struct gn_error *out_error);
 
 /** Milliseconds to wait in one gn_client_poll: until due_ns, but Ctrl-C must be seen meanwhile. */
 int gn_cmd_get_timeout_ms(int64_t due_ns);

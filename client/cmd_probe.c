@@ -5,18 +5,18 @@
  */
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "client/capture/file.h"
 #include "client/capture/sequence.h"
 #include "client/cmd.h"
+#include "client/capture/halves.h"
 #include "common/clock.h"
 #include "proto/attr.h"
 
 /** Pictures per second where neither the files nor --rate say. */
 #define DEFAULT_RATE_HZ 10.0
-/** How long the server's word on the last frame is waited for. */
-#define LAST_WORDS_NS (200 * GN_NS_PER_MS)
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
@@ -167,7 +167,7 @@ static enum gn_msg_pixel_format get_pixel_format(enum gn_capture_format format)
     case GN_CAPTURE_JPEG:
         return GN_MSG_PIXEL_FORMAT_JPEG;
     case GN_CAPTURE_RGB8:
-        break;
+        return GN_MSG_PIXEL_FORMAT_RGB8;
     }
     return GN_MSG_PIXEL_FORMAT_UNSPECIFIED;
 }
@@ -202,35 +202,67 @@ struct probe {
     uint64_t first_sequence;
     int64_t clock_ns; // when the clock was measured
     long n_sent;
+    uint8_t *halves; // [2 n_halves], owned
+    size_t n_halves;
+    bool has_told_halves;
 };
 
-/** Serves the connection until the time has come. 0, -EINTR (Ctrl-C), or an error and its sentence.
+/** Pixels of one picture as they are sent. */
+struct pixels {
+    enum gn_msg_pixel_format format;
+    double scale; // of the values
+    const uint8_t *data;
+    size_t n_bytes;
+};
+
+/**
+ * Halves where they say the same, or where floats would not fit into a message; else as they are.
  */
-static int wait_until(struct probe *p, int64_t due_ns, struct gn_error *out_error)
+static int get_pixels(struct probe *p, const struct gn_capture *capture, struct pixels *out,
+                      struct gn_error *out_error)
 {
-    for (;;) {
-        if (gn_cmd_is_interrupted())
-            return -EINTR;
-        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
-        struct gn_client_event event;
-        int got = gn_client_poll(p->client, timeout_ms, &event);
-        int err = got < 0   ? gn_cmd_set_fault(p->client, got, out_error)
-                  : got > 0 ? gn_cmd_take_event(&event, out_error)
-                            : gn_cmd_keep_clock(p->client, &p->clock_ns, out_error);
-        if (err || (got == 0 && timeout_ms == 0))
-            return err;
+    *out =
+        (struct pixels){get_pixel_format(capture->format), 1, capture->data, capture->data_bytes};
+    if (capture->format != GN_CAPTURE_RGB_F32)
+        return 0;
+    size_t n = capture->data_bytes / sizeof(float);
+    const float *values = (const float *)(const void *)capture->data;
+    bool is_exact = gn_halves_are_exact(values, n);
+    if (!is_exact && capture->data_bytes <= GN_LIMIT_ENVIRONMENT_BYTES)
+        return 0;
+    if (p->n_halves < n) {
+        free(p->halves);
+        p->halves = malloc(2 * n);
+        p->n_halves = p->halves ? n : 0;
+        if (!p->halves)
+            return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
     }
+    double scale = gn_halves_pack(values, n, p->halves);
+    if (!is_exact && !p->has_told_halves) {
+        p->has_told_halves = true;
+        printf("%s: too large for floats, sent as half floats times %g: exact to 0.05 %%, below "
+               "%.3g to %.3g\n",
+               capture->name, scale, scale * 0x1p-14, scale * 0x1p-25);
+    }
+    *out = (struct pixels){GN_MSG_PIXEL_FORMAT_RGB_F16, scale, p->halves, 2 * n};
+    return 0;
 }
 
 static int send_capture(struct probe *p, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
+    struct pixels pixels;
+    int err = get_pixels(p, capture, &pixels, out_error);
+    if (err)
+        return err;
+    double setup_scale = p->setup.response.scale == 0 ? 1 : p->setup.response.scale;
+    p->frame.scale = setup_scale * pixels.scale;
     p->frame.sequence = p->first_sequence + (uint64_t)p->n_sent;
     p->frame.capture_time_ns = gn_client_to_server_ns(p->client, gn_client_now_ns());
     p->frame.width = (uint32_t)capture->width;
     p->frame.height = (uint32_t)capture->height;
-    p->frame.pixel_format = get_pixel_format(capture->format);
-    int err = gn_client_send_environment(p->client, &p->frame, capture->data, capture->data_bytes);
+    p->frame.pixel_format = pixels.format;
+    err = gn_client_send_environment(p->client, &p->frame, pixels.data, pixels.n_bytes);
     if (err)
         return gn_cmd_set_fault(p->client, err, out_error);
     p->n_sent++;
@@ -251,14 +283,17 @@ static int stream(struct probe *p, struct gn_cmd_pace *pace, struct gn_error *ou
             break;
         int err = check_capture(&p->setup, &capture, out_error);
         if (!err)
-            err = wait_until(p, gn_cmd_pace_get_due_ns(pace, p->n_sent, capture.time_s), out_error);
+            err = gn_cmd_serve_until(p->client, &p->clock_ns,
+                                     gn_cmd_pace_get_due_ns(pace, p->n_sent, capture.time_s),
+                                     out_error);
         if (!err)
             err = send_capture(p, &capture, out_error);
         if (err)
             return err;
     }
     // An ERROR about the last frame is on its way, if there is one.
-    return wait_until(p, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
+    return gn_cmd_serve_until(p->client, &p->clock_ns,
+                              gn_clock_get_monotonic_ns() + GN_CMD_LAST_WORDS_NS, out_error);
 }
 
 /** Runs with everything open; the exit status. */
@@ -303,6 +338,7 @@ int gn_cmd_probe(int argc, char *const argv[])
         p.clock_ns = gn_clock_get_monotonic_ns();
         status = run(&p, &pace);
     }
+    free(p.halves);
     gn_cmd_disconnect(&p.client);
     gn_source_close(&p.source);
     gn_options_destroy(&options);

@@ -14,6 +14,7 @@ REPLAY = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
     ([GNOMON, 'probe'], CONNECT | REPLAY | {'setup', 'projection', 'first-sequence'}),
+    ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
     ([GNOMON, 'view'], CONNECT | REPLAY | {'camera', 'out', 'result', 'jpeg-quality', 'quality',
                                            'outstanding', 'sync-light'}),
     ([GNOMON, 'doctor'], CONNECT),
@@ -63,7 +64,7 @@ def check_program():
     """gnomon itself: each command once, with a summary."""
     text = ask(GNOMON, '--help')
     check_shape(text)
-    for command in ('probe', 'view', 'doctor'):
+    for command in ('probe', 'screen', 'view', 'doctor'):
         assert len(re.findall(r'^  %s +\S' % command, text, re.M)) == 1, text
     assert ask(GNOMON, 'help') == ask(GNOMON, '-h') == text
     assert re.fullmatch(r'gnomon \d+\.\d+\.\d+\n', ask(GNOMON, '--version'))
