@@ -7,6 +7,7 @@
  *   error.csv       one line for each scene, map and setting (metrics.h says what the errors are)
  *   irradiance.csv  harmonics at 200 normals
  *   stream.csv      flicker, noise and response of each method (sequence.h)
+ *   run.csv         the compiler and the extent
  *   reference.csv   the references' own error: against parts of twice the size, which is more than
  *                   what is left as long as halving the parts takes off half of the error or more
  * and fails where a reference's own error is over a tenth of the smallest error measured with it.
@@ -24,7 +25,9 @@
 #include "tests/bench/error_time/sequence.h"
 #include "tests/bench/error_time/settings.h"
 
-enum { MAX_REPEATS = 21, MAX_MAPS = 16 };
+enum { MAX_REPEATS = 21, MIN_REPEATS = 3, MAX_MAPS = 16 };
+/** What takes longer than this, ms, is not repeated more than MIN_REPEATS times. */
+#define LONG_MS 200.0
 
 /** How much is done. */
 struct extent {
@@ -32,15 +35,15 @@ struct extent {
     enum gn_bench_extent settings;
     int width, height; // of the pictures, px
     int map_size;      // of painted fisheyes, px; 0: their own
-    int factor;        // of the reference
+    bool is_quick;     // the guard's: references of whole texels, not checked
     int repeats;       // of times, [1, MAX_REPEATS]
-    int n_maps;        // of gn_bench_map_names
+    int n_maps;        // of gn_bench_maps
 };
 
 static const struct extent extents[] = {
-    {"--quick", GN_BENCH_QUICK, 64, 48, 150, 1, 1, 3},
-    {"--default", GN_BENCH_DEFAULT, 128, 96, 0, 2, 5, 7},
-    {"--full", GN_BENCH_DEFAULT, 128, 96, 0, 2, MAX_REPEATS, MAX_MAPS},
+    {"--quick", GN_BENCH_QUICK, 64, 48, 150, true, 3, 3},
+    {"--default", GN_BENCH_DEFAULT, 128, 96, 0, false, 3, 7},
+    {"--full", GN_BENCH_DEFAULT, 128, 96, 0, false, MAX_REPEATS, MAX_MAPS},
 };
 
 struct bench {
@@ -59,6 +62,12 @@ struct bench {
 /** Median and interquartile range, ms. */
 struct timing {
     double median, range;
+};
+
+/** Times being taken. The first, a warm-up, does not count. */
+struct stopwatch {
+    int n; // -1: nothing yet
+    double ms[MAX_REPEATS], sum, start;
 };
 
 static void check(int result, const char *what, const char *which)
@@ -82,10 +91,26 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static struct timing sum_up(double *ms, int n)
+static void stop(struct stopwatch *watch)
 {
-    qsort(ms, (size_t)n, sizeof(*ms), compare_doubles);
-    return (struct timing){ms[n / 2], ms[3 * n / 4] - ms[n / 4]};
+    double ms = get_cpu_ms() - watch->start;
+    if (watch->n >= 0) {
+        watch->ms[watch->n] = ms;
+        watch->sum += ms;
+    }
+    watch->n++;
+}
+
+static bool is_enough(const struct bench *b, const struct stopwatch *watch)
+{
+    return watch->n >= b->extent->repeats || (watch->n >= MIN_REPEATS && watch->sum > LONG_MS);
+}
+
+static struct timing sum_up(struct stopwatch *watch)
+{
+    int n = watch->n;
+    qsort(watch->ms, (size_t)n, sizeof(watch->ms[0]), compare_doubles);
+    return (struct timing){watch->ms[n / 2], watch->ms[3 * n / 4] - watch->ms[n / 4]};
 }
 
 /** The state as a stream has it: its tables are the last state's. */
@@ -95,20 +120,19 @@ static struct gn_lighting_state *make_state(const struct bench *b, const struct 
                                             struct timing *out_timing)
 {
     struct gn_lighting_state *state = NULL;
-    double ms[MAX_REPEATS];
-    for (int i = -1; i < b->extent->repeats; i++) {
+    struct stopwatch watch = {.n = -1};
+    while (!is_enough(b, &watch)) {
         struct gn_light_options options = *wanted;
         struct gn_lighting_state *next;
         options.previous = state ? state : previous;
-        double before = get_cpu_ms();
+        watch.start = get_cpu_ms();
         check(gn_lighting_state_create(&map->frame, NULL, &options, NULL, &next, NULL),
               "the light of", map->name);
-        if (i >= 0)
-            ms[i] = get_cpu_ms() - before;
+        stop(&watch);
         gn_lighting_state_unref(&state);
         state = next;
     }
-    *out_timing = sum_up(ms, b->extent->repeats);
+    *out_timing = sum_up(&watch);
     return state;
 }
 
@@ -117,16 +141,15 @@ static struct timing render(const struct bench *b, struct gn_bench_scene *scene,
 {
     const struct gn_render_options options = {.quality = quality, .single_ray = true};
     struct gn_test_stage *stage = &scene->stage;
-    double ms[MAX_REPEATS];
-    for (int i = -1; i < b->extent->repeats; i++) {
-        double before = get_cpu_ms();
+    struct stopwatch watch = {.n = -1};
+    while (!is_enough(b, &watch)) {
+        watch.start = get_cpu_ms();
         check(gn_renderer_render(stage->renderer, &stage->camera, state, &options, &stage->layers,
                                  &stage->report, NULL),
               "a frame of", scene->name);
-        if (i >= 0)
-            ms[i] = get_cpu_ms() - before;
+        stop(&watch);
     }
-    return sum_up(ms, b->extent->repeats);
+    return sum_up(&watch);
 }
 
 static uint64_t count_rays(const struct gn_render_report *r)
@@ -185,20 +208,20 @@ static void measure_harmonics(struct bench *b, const struct gn_bench_map *map,
 }
 
 /** The pictures to compare with, and how far they are from those of larger parts. */
-static void make_references(struct bench *b, const struct gn_bench_map *map,
+static void make_references(struct bench *b, const struct gn_bench_map *map, int factor,
                             struct gn_bench_picture out[static GN_BENCH_SCENES])
 {
     for (int i = 0; i < GN_BENCH_SCENES; i++) {
         struct gn_bench_scene *scene = &b->scenes[i];
         struct gn_bench_picture coarse;
         struct gn_bench_errors self;
-        check(gn_bench_make_reference(&b->cache, scene, map, b->extent->factor, &out[i]),
-              "the reference of", map->name);
+        check(gn_bench_make_reference(&b->cache, scene, map, factor, &out[i]), "the reference of",
+              map->name);
         b->self_error[i] = 0;
         b->smallest[i] = INFINITY;
-        if (b->extent->factor == 1)
+        if (b->extent->is_quick)
             continue; // quick: only whether errors change is looked at
-        check(gn_bench_make_reference(&b->cache, scene, map, b->extent->factor / 2, &coarse),
+        check(gn_bench_make_reference(&b->cache, scene, map, factor / 2, &coarse),
               "the coarser reference of", map->name);
         const struct gn_layers layers = {.width = coarse.shadow.width,
                                          .height = coarse.shadow.height,
@@ -223,7 +246,7 @@ static void check_references(struct bench *b, const struct gn_bench_map *map)
     }
 }
 
-static void measure_map(struct bench *b, const char *name)
+static void measure_map(struct bench *b, const struct gn_bench_map_kind *kind)
 {
     static double exact[GN_BENCH_NORMALS][3];
     const struct gn_light_options first = {.no_sh = true};
@@ -231,13 +254,14 @@ static void measure_map(struct bench *b, const char *name)
     struct gn_lighting_state *state = NULL;
     struct gn_bench_map map;
     struct timing unused;
+    const char *name = kind->name;
     int ret = gn_bench_map_init(name, b->extent->map_size, &map);
     if (ret == -ENOENT) {
         printf("%-22s not here: left out\n", name);
         return;
     }
     check(ret, "the map", name);
-    make_references(b, &map, references);
+    make_references(b, &map, b->extent->is_quick ? 1 : kind->factor, references);
     state = make_state(b, &map, &first, NULL, &unused);
     gn_bench_sum_texels(state->map, exact);
     for (int i = 0; i < b->n_settings; i++)
@@ -284,8 +308,21 @@ static FILE *open_table(const struct bench *b, const char *name, const char *hea
     return file;
 }
 
+static void write_run(const struct bench *b)
+{
+    FILE *file = open_table(b, "run.csv", "compiler,width,height,repeats");
+#if defined(__clang__)
+    fprintf(file, "clang %s,", __clang_version__);
+#else
+    fprintf(file, "gcc %s,", __VERSION__);
+#endif
+    fprintf(file, "%d,%d,%d\n", b->extent->width, b->extent->height, b->extent->repeats);
+    check(fclose(file) == 0 ? 0 : -errno, "cannot write into", b->folder);
+}
+
 static void run(struct bench *b)
 {
+    write_run(b);
     b->errors = open_table(b, "error.csv",
                            "scene,map,method,params,asked,lights,ms_light,iqr_light,ms_frame,"
                            "iqr_frame,rays,rmse,bias,relmse,relmse_trimmed,irradiance,flip,masked");
@@ -297,8 +334,8 @@ static void run(struct bench *b)
         gn_bench_scene_init(&b->scenes[i], i, b->extent->width, b->extent->height);
     b->n_settings = gn_bench_list_settings(b->extent->settings, b->settings);
     for (int i = 0; i < gn_bench_n_maps && i < b->extent->n_maps; i++) {
-        if (!b->only_map || strcmp(b->only_map, gn_bench_map_names[i]) == 0)
-            measure_map(b, gn_bench_map_names[i]);
+        if (!b->only_map || strcmp(b->only_map, gn_bench_maps[i].name) == 0)
+            measure_map(b, &gn_bench_maps[i]);
     }
     if (!b->only_map)
         measure_streams(b);

@@ -14,18 +14,18 @@
 #include "tests/bench/seed_settings.h"
 #include "tests/meshes.h"
 
-const char *const gn_bench_map_names[] = {
-    "lamps",
-    "sun",
-    "overcast",
-    "rig", // no files
-    "interior",
-    "city",
-    "sunrise", // GN_TEST_MAPS
-    "drachenfels_cellar_1k",
-    "lebombo_1k", // GNOMON_DATA
+const struct gn_bench_map_kind gn_bench_maps[] = {
+    {"lamps", 4},
+    {"sun", 4},
+    {"overcast", 2},
+    {"rig", 4}, // no files
+    {"interior", 2},
+    {"city", 2},
+    {"sunrise", 2}, // GN_TEST_MAPS
+    {"drachenfels_cellar_1k", 2},
+    {"lebombo_1k", 2}, // GNOMON_DATA
 };
-const int gn_bench_n_maps = GN_ARRAY_LEN(gn_bench_map_names);
+const int gn_bench_n_maps = GN_ARRAY_LEN(gn_bench_maps);
 
 enum { SIZE = 300, PARTS = 4 };
 

@@ -15,8 +15,12 @@ struct gn_bench_map {
     struct gn_environment_frame frame;
 };
 
-/** The names there are, in the order of the tables: painted, the rig's, photographs. */
-extern const char *const gn_bench_map_names[];
+/** The maps there are, in the order of the tables: painted, the rig's, photographs. factor: into
+ * how many parts a side its texels are cut for references; lamps' edges need more than a sky's. */
+extern const struct gn_bench_map_kind {
+    const char *name;
+    int factor; // even
+} gn_bench_maps[];
 extern const int gn_bench_n_maps;
 
 /** What a painted map changes from frame to frame. All-zero: nothing. */

@@ -14,7 +14,6 @@ static const struct variant {
     enum gn_light_weights weights;
     bool relaxed;
 } variants[] = {
-    {GN_LIGHT_PENROSE, "+w2", GN_WEIGHTS_DENSITY, false},
     {GN_LIGHT_PENROSE, "+w3", GN_WEIGHTS_PARTITION, false},
     {GN_LIGHT_PENROSE, "+w3 relaxed", GN_WEIGHTS_PARTITION, true},
 };
@@ -40,7 +39,7 @@ static void add_aims(struct list *list, enum gn_bench_extent extent, enum gn_lig
     static const int aims[] = {4, 8, 16, 32, 64, 128, 256, 512, 1024};
     for (size_t i = 0; i < GN_ARRAY_LEN(aims); i++) {
         if ((extent == GN_BENCH_STREAM && aims[i] != 64) ||
-            (extent == GN_BENCH_QUICK && aims[i] != 16 && aims[i] != 64 && aims[i] != 256))
+            (extent == GN_BENCH_QUICK && aims[i] != 16 && aims[i] != 64))
             continue;
         struct gn_bench_setting *s =
             add(list, gn_light_method_get_name(method), variant ? variant->suffix : "");

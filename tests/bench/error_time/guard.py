@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""No method's error may grow unseen. TAP on stdout.
+
+usage: guard.py ERROR_TIME EXPECTED.csv WORK_FOLDER [--update]
+
+Runs the quick sweep of error_time, whose figures are the same bits each time, and compares them with
+the table in the tree: nothing may be more than 3 % worse, nothing missing, nothing new. Times are not
+in the table; within the run, the default method may not take longer than the paper's literal partition.
+--update writes the table anew; say why in the commit.
+"""
+import csv
+import os
+import subprocess
+import sys
+
+import tables
+
+GROWTH = 1.03
+SLACK = 1e-5  # differences up to this are nothing
+# What is looked at: table, its key columns, its figures, for all of which less is better.
+WATCHED = [("error.csv", ["scene", "map", "method", "params"],
+            ["rmse", "irradiance", "flip", "relmse_trimmed"]),
+           ("irradiance.csv", ["map", "harmonics"], ["irradiance"]),
+           ("stream.csv", ["method", "params", "smoothing"],
+            ["flicker", "noise_codes", "response_frames"])]
+
+
+def collect(folder):
+    """{(table, key, figure): value}"""
+    found = {}
+    for name, keys, figures in WATCHED:
+        for row in tables.read(folder, name):
+            key = " ".join(f"{row[k]:g}" if isinstance(row[k], float) else row[k] for k in keys)
+            for figure in figures:
+                found[name.removesuffix(".csv"), key, figure] = row[figure]
+    return found
+
+
+def load(path):
+    with open(path, newline="", encoding="utf-8") as f:
+        return {(r["table"], r["key"], r["figure"]): float(r["value"]) for r in csv.DictReader(f)}
+
+
+def save(path, found):
+    with open(path, "w", newline="", encoding="utf-8") as f:
+        writer = csv.writer(f, lineterminator="\n")
+        writer.writerow(["table", "key", "figure", "value"])
+        for key, value in found.items():
+            writer.writerow([*key, f"{value:.5g}"])
+
+
+def get_light_ms(folder, method):
+    """Mean over maps of the median time from frame to lights, where about 64 lights were wanted."""
+    rows = [r for r in tables.read(folder, "error.csv") if r["scene"] == "ball"
+            and r["method"] == method and (r["asked"] == 64 or method in tables.BASELINE)]
+    return sum(r["ms_light"] for r in rows) / len(rows)
+
+
+def main():
+    if len(sys.argv) not in (4, 5) or sys.argv[4:] not in ([], ["--update"]):
+        sys.exit(__doc__)
+    tool, expected_path, work = sys.argv[1:4]
+    out = os.path.join(work, "quick")
+    os.makedirs(out, exist_ok=True)
+    done = subprocess.run([tool, "--quick", "--cache", os.path.join(work, "references"), out],
+                          capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{tool}: exit {done.returncode}: {done.stderr.strip()}")
+    found = collect(out)
+    if sys.argv[4:]:
+        save(expected_path, found)
+        return
+    expected = load(expected_path)
+    groups = list(dict.fromkeys((k[0], k[2]) for k in list(expected) + list(found)))
+    print(f"1..{len(groups) + 2}")
+    for n, (table, figure) in enumerate(groups, 1):
+        bad, better = [], 0
+        for key, was in expected.items():
+            if (key[0], key[2]) != (table, figure):
+                continue
+            now = found.get(key)
+            if now is None:
+                bad.append(f"{key[1]}: not measured any more")
+            elif not now <= was * GROWTH + SLACK:  # a NaN is bad too
+                bad.append(f"{key[1]}: {now:.4g}, was {was:.4g}")
+            elif now < was / GROWTH - SLACK:
+                better += 1
+        for line in bad[:20]:
+            print(f"# {line}")
+        if better:
+            print(f"# {better} figures are better than in the table: guard.py --update keeps that")
+        print(f"{'not ok' if bad else 'ok'} {n} - {table}: no {figure} has grown")
+    new = sorted({k[1] for k in found if k not in expected})
+    for key in new[:20]:
+        print(f"# not in the table: {key}")
+    print(f"{'not ok' if new else 'ok'} {len(groups) + 1} - all that is measured is in the table")
+    default, literal = get_light_ms(out, default_method(out)), get_light_ms(out, "seed")
+    print(f"# frame to lights: default {default:.2f} ms, the paper's partition {literal:.2f} ms")
+    print(f"{'ok' if default <= literal else 'not ok'} {len(groups) + 2} - "
+          "the default takes no longer than the paper's partition")
+
+
+def default_method(folder):
+    """Of enum value 0: the first one that is listed."""
+    return tables.read(folder, "error.csv")[0]["method"]
+
+
+main()

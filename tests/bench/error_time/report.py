@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""Makes the page and its plots of what error_time measured. Nothing in them is written by hand.
+
+usage: report.py FOLDER [DOCS]
+
+FOLDER holds the tables of error_time; plots.svg and plots.png files and page.md go there. With DOCS (the
+tree's docs folder) the page goes to DOCS/error.md and the SVG plots beside it. Needs gnuplot.
+"""
+import math
+import os
+import shutil
+import subprocess
+import sys
+
+import tables
+from curves import Curves, geometric_mean
+
+BUDGETS_MS = [4, 8, 16, 32, 64, 128]
+LEVELS = [0.05, 0.02, 0.01]
+PLOT_MAPS = ["lamps", "sun", "overcast", "rig"]
+BASE = "the paper's partition"
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |",
+             "| --- |" + " ---: |" * (len(head) - 1)]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows]
+
+
+def number(value, digits=2):
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{value:#.{digits}g}".rstrip(".") if value < 10 ** digits else f"{value:.0f}"
+
+
+def ratio(value):
+    return "-" if value is None else f"{value:.1f}" if value < 10 else f"{value:.0f}"
+
+
+def front_table(curves):
+    rows = []
+    for budget in BUDGETS_MS:
+        ranked = sorted((curves.mean_error_at_time(m, budget), m) for m in curves.methods
+                        if curves.mean_error_at_time(m, budget) is not None)
+        base = curves.mean_error_at_time(BASE, budget)
+        if not ranked:
+            rows.append([f"{budget}", "none", "-", "-", "-"])
+            continue
+        second = ranked[1] if len(ranked) > 1 else None
+        best_error, best = ranked[0]
+        rows.append([f"{budget}", f"**{best}**", number(best_error),
+                     f"{second[1]}, {number(second[0])}" if second else "-", number(base)])
+    return table(["ms", "lowest error", "RMSE", "second", BASE], rows)
+
+
+def equal_time_table(curves):
+    rows = []
+    for method in curves.methods:
+        cells = []
+        for budget in BUDGETS_MS:
+            ratios = curves.error_ratios(method, BASE, budget)
+            cells.append(f"{ratio(geometric_mean(ratios))} ({ratio(min(ratios))})" if ratios else "-")
+        rows.append([method] + cells)
+    return table(["method"] + [f"{b} ms" for b in BUDGETS_MS], rows)
+
+
+def equal_error_table(curves):
+    rows = []
+    for method in curves.methods:
+        cells = []
+        for level in [0.1] + LEVELS:
+            ratios, base_never, never = curves.time_ratios(method, BASE, level)
+            text = f"{ratio(geometric_mean(ratios))} ({ratio(min(ratios))})" if ratios else "-"
+            if base_never:
+                text += f", +{base_never}"
+            if never:
+                text += f", -{never}"
+            cells.append(text)
+        rows.append([method] + cells)
+    return table(["method"] + [f"RMSE {level:g}" for level in [0.1] + LEVELS], rows)
+
+
+def lights_table(curves):
+    rows = []
+    for method in curves.methods + [BASE]:
+        cells = []
+        for map_name in curves.maps:
+            needed = [curves.lights_for(method, map_name, level) for level in LEVELS]
+            cells.append(" / ".join("-" if n is None else f"{n:.0f}" for n in needed))
+        rows.append([method] + cells)
+    return table(["method"] + curves.maps, rows)
+
+
+def same_lights_table(curves):
+    """At no more lights than the literal partition's best setting of at most N has."""
+    rows = []
+    for method in curves.methods:
+        cells = []
+        for map_name in curves.maps:
+            parts = []
+            for n in (64, 256):
+                ratios = curves.same_lights_ratios(method, BASE, map_name, n)
+                parts.append(ratio(geometric_mean(ratios)) if ratios else "-")
+            cells.append(" / ".join(parts))
+        rows.append([method] + cells)
+    return table(["method"] + curves.maps, rows)
+
+
+def irradiance_tables(curves, harmonics):
+    rows = []
+    for method in curves.methods:
+        rows.append([method] + [number(curves.irradiance_at(method, m, 64)) for m in curves.maps])
+    kinds = list(dict.fromkeys(r["harmonics"] for r in harmonics))
+    for kind in kinds:
+        found = {r["map"]: r["irradiance"] for r in harmonics if r["harmonics"] == kind}
+        rows.append([f"harmonics, {kind}"] + [number(found.get(m)) for m in curves.maps])
+    return table(["method"] + curves.maps, rows)
+
+
+def still_table(curves, n):
+    rows = []
+    for method in curves.methods + [BASE]:
+        row = curves.mean_row(method, n)
+        if row:
+            rows.append([method, f"{row['lights']:.0f}", number(row["rmse"]),
+                         f"{row['bias']:+.1e}", number(row["relmse_trimmed"]),
+                         number(row["relmse"]), number(row["flip"]), number(row["ms_light"]),
+                         number(row["ms_frame"]), f"{row['rays'] / 1e3:.0f}"])
+    return table(["method", "lights", "RMSE", "bias", "relMSE, trimmed", "untrimmed", "FLIP",
+                  "ms to lights", "ms frame", "1000 rays"], rows)
+
+
+def stream_table(stream):
+    rows = []
+    for s in stream:
+        name = s["method"] if s["method"] not in tables.BASELINE else f"{s['method']}, {s['params']}"
+        rows.append([name, f"{s['lights']:.0f}", f"{s['smoothing']:g}", number(s["flicker"]),
+                     number(s["noise_codes"]), f"{s['response_frames']:.0f}"])
+    return table(["method", "lights", "filter s", "flicker F", "noise, codes", "frames to 90 %"], rows)
+
+
+def reference_table(reference):
+    return table(["map", "scene", "reference within", "smallest error", "ratio"],
+                 [[r["map"], r["scene"], f"{r['self_error']:.1e}", f"{r['smallest']:.1e}",
+                   f"{r['smallest'] / r['self_error']:.0f}" if r["self_error"] else "-"]
+                  for r in reference])
+
+
+def get_machine():
+    model = "unknown processor"
+    with open("/proc/cpuinfo", encoding="utf-8") as f:
+        for line in f:
+            if line.startswith("model name"):
+                model = line.split(":", 1)[1].strip()
+                break
+    return f"{model}, {os.cpu_count()} processors"
+
+
+def get_commit():
+    here = os.path.dirname(os.path.abspath(__file__))
+    done = subprocess.run(["git", "-C", here, "log", "-1", "--format=%h of %cs"],
+                          capture_output=True, text=True)
+    return done.stdout.strip() or "unknown"
+
+
+PLOT_HEAD = """
+set logscale xy
+set grid
+set key off
+set format y "%g"
+set style line 100 lc rgb "#999999" dt 2 lw 1
+"""
+
+
+def plot_panel(out, curves, map_name, axis, title, is_last, floor):
+    """axis 1: time, 0: lights."""
+    names = curves.methods + [BASE]
+    parts = []
+    for i, method in enumerate(names):
+        points = curves.points(method, "ball", map_name)
+        path = os.path.join(out, f"{axis}_{map_name}_{i}.dat")
+        with open(path, "w", encoding="utf-8") as f:
+            for lights, ms, error in points:
+                f.write(f"{ms if axis else lights} {error}\n")
+        width, kind = (3, 7) if method == BASE else (1.3, i % 13 + 1)
+        color = "black" if method == BASE else COLORS[i % len(COLORS)]
+        parts.append(f"'{path}' using 1:2 with linespoints lw {width} pt {kind} ps 0.5 "
+                     f"lc rgb '{color}' title '{method}'")
+    x0 = 30 if axis else 16
+    parts.append(f"{floor}*({x0}/x)**0.5 ls 100 title 'slope -1/2'")
+    parts.append(f"{floor}*({x0}/x) ls 100 dt 3 title 'slope -1'")
+    key = "set key outside right center font ',9' samplen 2" if is_last else "set key off"
+    return f"set title '{title}'\n{key}\nplot {', '.join(parts)}\n"
+
+
+COLORS = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2",
+          "#bcbd22", "#7f7f7f", "#393b79"]
+
+
+def draw(folder, name, body, size):
+    for terminal, suffix in (("svg", "svg"), ("pngcairo", "png")):
+        scale = f"{size[0]},{size[1]}"
+        script = (f"set terminal {terminal} size {scale} font 'sans,11' background rgb 'white'\n"
+                  f"set output '{os.path.join(folder, name)}.{suffix}'\n{PLOT_HEAD}{body}\nunset multiplot\n")
+        done = subprocess.run(["gnuplot"], input=script, text=True, capture_output=True)
+        if done.returncode:
+            sys.exit(f"gnuplot, {name}.{suffix}: {done.stderr.strip()}")
+
+
+def draw_all(folder, curves, stream):
+    data = os.path.join(folder, "data")
+    os.makedirs(data, exist_ok=True)
+    maps = [m for m in PLOT_MAPS if m in curves.maps]
+    for name, axis, label in (("error-time", 1, "ms, frame to lights and picture"),
+                              ("error-lights", 0, "lights")):
+        body = (f"set multiplot layout 2,2\nset xlabel '{label}'\nset ylabel 'RMSE of the shadow'\n"
+                "set xrange [*:*]\nset yrange [0.001:0.3]\n")
+        for i, map_name in enumerate(maps):
+            body += plot_panel(data, curves, map_name, axis, f"{map_name}, ball",
+                               i == len(maps) - 1, 0.06)
+        draw(folder, name, body, (1000, 720))
+    rows = [s for s in stream if s["smoothing"] == 0]
+    path = os.path.join(data, "stream.dat")
+    with open(path, "w", encoding="utf-8") as f:
+        for s in rows:
+            base = s["method"] in tables.BASELINE
+            row = curves.mean_row_on(BASE if base else s["method"], "lamps", 64)
+            if row:
+                f.write(f"{row['rmse']} {s['flicker']} \"{s['method']}\"\n")
+    body = (f"set xlabel 'RMSE of the shadow, lamps, about 64 lights'\nset ylabel 'flicker F'\n"
+            f"set offsets graph 0.1, graph 0.2, graph 0.1, graph 0.1\n"
+            f"plot '{path}' using 1:2:3 with labels point pt 7 offset char 1,0.6 left notitle\n")
+    draw(folder, "error-flicker", body, (640, 420))
+
+
+def make_page(folder, curves):
+    harmonics = tables.read(folder, "irradiance.csv")
+    stream = tables.read(folder, "stream.csv")
+    run = tables.read(folder, "run.csv")[0]
+    draw_all(folder, curves, stream)
+    template = os.path.join(os.path.dirname(os.path.abspath(__file__)), "page.md.in")
+    with open(template, encoding="utf-8") as f:
+        page = f.read()
+    fields = {
+        "machine": get_machine(), "commit": get_commit(), "compiler": run["compiler"],
+        "size": f"{run['width']:.0f} x {run['height']:.0f}", "repeats": f"{run['repeats']:.0f}",
+        "maps": ", ".join(curves.maps), "n_pairs": f"{len(curves.pairs)}",
+        "front": front_table(curves), "equal_time": equal_time_table(curves),
+        "equal_error": equal_error_table(curves), "lights": lights_table(curves),
+        "same_lights": same_lights_table(curves), "still": still_table(curves, 64),
+        "irradiance": irradiance_tables(curves, harmonics), "stream": stream_table(stream),
+        "reference": reference_table(tables.read(folder, "reference.csv")),
+    }
+    for key, value in fields.items():
+        page = page.replace(f"@{key}@", "\n".join(value) if isinstance(value, list) else value)
+    return page
+
+
+def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
+    folder = sys.argv[1]
+    curves = Curves(tables.read(folder, "error.csv"), BASE)
+    page = make_page(folder, curves)
+    with open(os.path.join(folder, "page.md"), "w", encoding="utf-8") as f:
+        f.write(page)
+    if sys.argv[2:]:
+        shutil.copyfile(os.path.join(folder, "page.md"), os.path.join(sys.argv[2], "error.md"))
+        for name in ("error-time", "error-lights", "error-flicker"):
+            shutil.copyfile(os.path.join(folder, f"{name}.svg"),
+                            os.path.join(sys.argv[2], f"{name}.svg"))
+
+
+main()
