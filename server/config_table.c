@@ -92,7 +92,7 @@ static const struct gn_option table[] = {
      .help = "Moves importance samples by the correction table: laid out more evenly, but they "
              "move when the light changes. For light that stands still."},
     {ROOM, .key = "light-smoothing-ms", .type = GN_OPTION_DOUBLE, .min = 0, .max = 10000,
-     .default_value = "300",
+     .default_value = "400",
      .help = "Time constant by which light at rest follows the environment frames, so that the "
              "sensor's noise does not move it; what changes by more than noise is followed within "
              "100 ms whatever is given here. 0: each frame stands alone."},

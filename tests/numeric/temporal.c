@@ -91,7 +91,7 @@ static void depends_on_time_not_on_the_rate(void **test)
     assert_true(power < 1e-6 && turn < 2e-4);
     compare_rates(0.2, &power, &turn);
     assert_true(power < 0.01 && turn < 0.01);
-    compare_rates(0.3, &power, &turn);
+    compare_rates(0.4, &power, &turn);
     assert_true(power < 0.01 && turn < 0.01);
 }
 
