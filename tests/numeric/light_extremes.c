@@ -279,8 +279,8 @@ static void trap_29_the_fill_leaves_the_upper_side_alone(void **unused)
         struct gn_error error = {0};
         assert_int_equal(gn_lighting_state_create(&f.frame, &options, NULL, NULL, &s, &error), 0);
         const struct gn_lighting_state *state = s;
-        gn_sh_get_irradiance(2, state->sh, (double[3]){0, 0, 1}, e[i]);
-        gn_sh_get_irradiance(2, state->sh, (double[3]){0, 0, -1}, below[i]);
+        gn_sh_get_irradiance(4, state->sh, (double[3]){0, 0, 1}, e[i]);
+        gn_sh_get_irradiance(4, state->sh, (double[3]){0, 0, -1}, below[i]);
         gn_lighting_state_unref(&s);
     }
     for (int c = 0; c < 3; c++) {
