@@ -428,7 +428,8 @@ void gn_render_lights_add(struct light_list *list, const double dir[static 3],
 void gn_render_lights_pad(struct light_list *list, int multiple);
 /** Fills list from the states' lights; dark ones are left out. Of more than GN_LIGHTS_MAX together
  * each probe has its share, the brightest, which stand for all its light. */
-GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list);
+GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list,
+                                            struct placed_lights *placed);
 /** Sets the weights of samples that see a surface. */
 void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n);
 

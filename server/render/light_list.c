@@ -110,9 +110,9 @@ static void add_light(const struct gn_light *light, const double irradiance[stat
 }
 
 /** Adds the state's first n lights; where those are not all, scaled to the sum of all. spare: how
- * many more directions discs may take. */
+ * many more directions discs may take. Those at a distance go to `placed` while it has room. */
 static void add_lights(const struct gn_lighting_state *state, int n, int spare,
-                       struct light_list *list)
+                       struct light_list *list, struct placed_lights *placed)
 {
     double all[3] = {0};
     double some[3] = {0};
@@ -129,6 +129,11 @@ static void add_lights(const struct gn_lighting_state *state, int n, int spare,
         for (int k = 0; k < 3; k++)
             irradiance[k] =
                 light->irradiance[k] * (n < state->n_lights && some[k] > 0 ? all[k] / some[k] : 1);
+        if (gn_placed_add(placed, state, light, irradiance)) {
+            for (int k = 0; k < 3; k++)
+                list->total[k] += irradiance[k];
+            continue;
+        }
         double share = energy > 0 ? get_luminance(irradiance) / energy : 0;
         int n_directions = count_directions(light, share, spare);
         spare -= n_directions - 1;
@@ -136,10 +141,13 @@ static void add_lights(const struct gn_lighting_state *state, int n, int spare,
     }
 }
 
-int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list)
+int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list,
+                                struct placed_lights *placed)
 {
     int64_t n_all = 0;
     int ret = gn_render_lights_reserve(list, GN_LIGHTS_MAX);
+    if (ret == 0)
+        ret = gn_placed_reserve(placed, blend);
     if (ret < 0)
         return ret;
     for (int i = 0; i < blend->n; i++)
@@ -149,8 +157,9 @@ int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list 
         int n = blend->state[i]->n_lights;
         int share = GN_LIGHTS_MAX / blend->n;
         n = n_all > GN_LIGHTS_MAX && n > share ? share : n;
-        add_lights(blend->state[i], n, spare / blend->n, list);
+        add_lights(blend->state[i], n, spare / blend->n, list, placed);
         list->ends[i] = list->n;
+        placed->ends[i] = placed->n;
     }
     return 0;
 }

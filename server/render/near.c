@@ -90,13 +90,16 @@ void gn_near_shade(const struct frame *frame, struct scratch *scratch, int n,
             scratch->lit[m++] = i;
     }
     memset(irradiance, 0, (size_t)m * sizeof(irradiance[0]));
-    for (int l = 0; l < frame->near.n && m > 0; l++) {
+    // The irradiance map has all light of the map already.
+    int first = frame->options.shading == GN_SHADING_IRRADIANCE ? frame->near.n_placed : 0;
+    for (int l = first; l < frame->near.n && m > 0; l++) {
         for (int j = 0; j < m; j++) {
             const struct sample *s = &scratch->samples[scratch->lit[j]];
             struct near_ray ray;
             if (!gn_near_aim(&frame->near.lights[l], s->org, &ray))
                 continue;
-            double weight = ray.weight * (double)surface_cosine(&s->surface, ray.dir);
+            double weight = ray.weight * (double)surface_cosine(&s->surface, ray.dir) *
+                            gn_placed_get_weight(frame, s, l);
             figures->n_near += weight > 0;
             if (weight > 0 && add_ray(scratch, s->org, &ray, j, l, (float)weight))
                 flush_light(frame, scratch, irradiance, &figures->rays_shade);
@@ -279,7 +282,8 @@ void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile
                 !aim_receiver(frame, scratch, j, l, &ray, &cosine))
                 continue;
             figures->n_near++;
-            double weight = ray.weight * (frame->options.shadow_unweighted ? 1 : cosine);
+            double weight = ray.weight * (frame->options.shadow_unweighted ? 1 : cosine) *
+                            gn_placed_get_weight(frame, s, l);
             add_to_halves(light, l, weight, s->open);
             if (scratch->near_cut[j / LANES][l] & bit)
                 add_to_halves(light, l, weight, s->cut);
@@ -349,7 +353,17 @@ int gn_near_prepare(struct near_store *store, const struct gn_scene *scene,
                     struct near_lights *out_near)
 {
     struct near_lights near = {.n = state->n_near, .lights = state->near};
+    const struct placed_lights *placed = &store->placed;
     int ret = 0;
+    if (!is_reference && placed->n > 0) {
+        if (state->n_near > 0)
+            memcpy(placed->lights + placed->n, state->near,
+                   (size_t)state->n_near * sizeof(*state->near));
+        near.lights = placed->lights;
+        near.n = placed->n + state->n_near;
+        near.n_placed = placed->n;
+        memcpy(near.ends, placed->ends, sizeof(near.ends));
+    }
     if (is_reference && state->emission)
         ret = prepare_fine(store, scene, state->emission, &near);
     if (ret == 0 && is_reference)
@@ -366,6 +380,7 @@ int gn_near_prepare(struct near_store *store, const struct gn_scene *scene,
 
 void gn_near_store_finish(struct near_store *store)
 {
+    free(store->placed.lights);
     gn_emission_unref(&store->emission);
     gn_emitters_destroy(&store->fine);
     free(store->cdf);

@@ -8,6 +8,7 @@
 #ifndef GN_SERVER_RENDER_NEAR_H
 #define GN_SERVER_RENDER_NEAR_H
 
+#include "server/light/blend.h"
 #include "server/light/pieces.h"
 #include "server/render/render.h"
 
@@ -33,6 +34,8 @@ struct near_lights {
     int n;
     const struct gn_near_light *lights; // [n], borrowed
     int n_real, n_virtual;              // by role
+    int n_placed;                       // the first ones: placed lights, each of a probe
+    int ends[GN_PROBES_MAX];            // of each probe's placed lights
     // Reference only, where the state has an emission: its own, finer pieces.
     const struct gn_pieces *pieces; // NULL: none
     int first_piece;                // lights[first_piece + i] is of pieces[i]
@@ -64,12 +67,31 @@ void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile
 /** Can any near light change a real surface? */
 bool gn_near_can_cast(const struct frame *frame);
 
+/**
+ * Global model: a state's light at a finite distance as a near light: a piece of a real surface
+ * that sends by Lambert's law what the probe measured. As wide as the light's spread, so that it
+ * is smooth near by.
+ */
+struct placed_lights {
+    int n, limit;
+    int ends[GN_PROBES_MAX];      // of each probe's
+    struct gn_near_light *lights; // owned; GN_NEAR_LIGHTS_MAX, or NULL
+};
+/** Empties the list; room is left for the state's own near lights. 0 or -ENOMEM. */
+GN_MUST_USE int gn_placed_reserve(struct placed_lights *placed, const struct gn_blend *blend);
+/** False, and nothing is added, where the light is distant or the list is full. */
+bool gn_placed_add(struct placed_lights *placed, const struct gn_lighting_state *state,
+                   const struct gn_light *light, const double irradiance[static 3]);
+/** Weight of near light l at the sample: its probe's, or 1. */
+double gn_placed_get_weight(const struct frame *frame, const struct sample *sample, int l);
+
 /** What the renderer keeps for the near lights of its frames. Thread-safety: unsafe. */
 struct near_store {
     struct gn_emitters *fine;     // of the reference; made at its first frame
     struct gn_emission *emission; // what `fine` sends, shared
     double *cdf;
     int capacity;
+    struct placed_lights placed; // and behind them the state's near lights
 };
 /** The state's near light for one frame; borrows state and store. 0, or -ENOMEM and the like. */
 GN_MUST_USE int gn_near_prepare(struct near_store *store, const struct gn_scene *scene,

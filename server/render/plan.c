@@ -172,8 +172,11 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     set_line(report, SHADOW, no_shadow, "virtual objects may hide light from real ones");
     set_line(report, BLOCKERS, no_shadow ? no_shadow : no_blockers,
              "real objects may hide light from real ones");
-    set_line(report, NEAR, why_not_near(frame, no_virtual, no_shadow),
-             "lamps and emissive meshes are tried from each surface");
+    set_line(
+        report, NEAR, why_not_near(frame, no_virtual, no_shadow),
+        frame->near.n_placed > 0
+            ? "lights at finite places, modelled surfaces among them, are tried from each surface"
+            : "lamps and emissive meshes are tried from each surface");
     bool can_add = frame->run_bounces || frame->near.n_virtual > 0;
     set_line(report, ADDED,
              !can_add ? "0 bounces: nothing is added; caustics of mirrors are not built"

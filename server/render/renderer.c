@@ -520,7 +520,7 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     if (ret == 0)
         ret = quality == GN_QUALITY_REFERENCE
                   ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
-                  : gn_render_lights_from_blend(blend, &renderer->lights);
+                  : gn_render_lights_from_blend(blend, &renderer->lights, &renderer->near.placed);
     if (ret == 0 && quality == GN_QUALITY_REFERENCE)
         ret = reserve_texels(renderer);
     if (ret == 0 && quality == GN_QUALITY_REFERENCE)

@@ -257,10 +257,21 @@ static void test_reference(void **state)
     assert_true(fmin(bare, floor_) > 0.25);
 }
 
+static void test_interactive(void **state)
+{
+    const struct gn_render_options plain = {.no_shadow = true};
+    double bare = get_error(*state, 1, false, &plain, "64 lights, local, nothing modelled");
+    double floor_ = get_error(*state, 2, false, &plain, "64 lights, local, floor");
+    double global = get_error(*state, N_PARTS, true, &plain, "64 lights, global");
+    assert_true(global < 0.08);
+    assert_true(fmin(bare, floor_) > 0.25);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_reference),
+        cmocka_unit_test(test_interactive),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
