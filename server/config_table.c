@@ -85,9 +85,9 @@ static const struct gn_option table[] = {
      .default_value = "none",
      .help = "Readings not taken to the letter after all; wins over light-literal."},
     {ROOM, .key = "light-weights", .type = GN_OPTION_ENUM, .choices = GN_WEIGHTS_NAMES,
-     .default_value = "equal",
-     .help = "What each importance sample stands for (penrose): the same power; its radiance over "
-             "the samples' density; or the light of all texels nearest to it."},
+     .default_value = "partition",
+     .help = "What each importance sample stands for (penrose): the light of all texels nearest "
+             "to it; the same power; or its radiance over the samples' density."},
     {ROOM, .key = "light-relaxed", .type = GN_OPTION_BOOL, .default_value = "false",
      .help = "Moves importance samples by the correction table: laid out more evenly, but they "
              "move when the light changes. For light that stands still."},

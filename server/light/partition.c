@@ -150,7 +150,9 @@ static uint32_t find_brightest(const struct gn_partition *p, const struct gn_spl
 static uint64_t get_region_id(const struct gn_partition *p, const struct gn_region *region,
                               uint64_t path)
 {
-    return GN_LIGHT_ID_REGION | (uint64_t)(region - p->regions) << 44 | path;
+    int r = (int)(region - p->regions), n_base = p->plan->n_regions;
+    return r < n_base ? GN_LIGHT_ID_REGION | (uint64_t)r << 44 | path
+                      : GN_LIGHT_ID_DARK | (uint64_t)(r - n_base) << 44 | path;
 }
 
 static void take_part(void *context, const struct gn_split_item *items, int n, uint64_t path)
@@ -182,22 +184,56 @@ static void take_part(void *context, const struct gn_split_item *items, int n, u
     }
 }
 
-/* The region's lit texels as items; weights as shares, so that no scale of light is too large. */
-static int list_texels(struct gn_partition *p, int r)
+/* Adds a base region's lit texels to the items; weights as shares of the energy, so that no scale
+ * of light is too large. */
+static int list_texels(const struct gn_partition *p, int r, double energy,
+                       struct gn_split_item *items)
 {
     const struct gn_partition_plan *plan = p->plan;
-    double scale = 1 / p->regions[r].patch.energy;
     int n = 0;
     for (uint32_t i = plan->start[r]; i < plan->start[r + 1]; i++) {
         uint32_t texel = plan->texel[i];
-        double energy = get_luminance(p, texel) * (double)p->map->solid_angle[texel];
-        if (energy > 0)
-            p->items[plan->start[r] + (uint32_t)n++] =
-                (struct gn_split_item){{plan->polar[2 * (size_t)i], plan->polar[2 * (size_t)i + 1]},
-                                       (float)(energy * scale),
-                                       texel};
+        double share = get_luminance(p, texel) * (double)p->map->solid_angle[texel] / energy;
+        const float *polar = plan->polar + 2 * (size_t)i;
+        if (share > 0)
+            items[n++] = (struct gn_split_item){{polar[0], polar[1]}, (float)share, texel};
     }
     return n;
+}
+
+/* The box, and the texels as items, of a region or of the dark regions of a cell. */
+static int list_items(const struct gn_partition *p, int r, struct gn_polar_box *out_box)
+{
+    const struct gn_region *region = &p->regions[r];
+    struct gn_split_item *items = p->items + region->first_item;
+    double energy = region->patch.energy;
+    int n = 0, n_base = p->plan->n_regions;
+    *out_box = (struct gn_polar_box){{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    for (int k = r < n_base ? r : 0; k < (r < n_base ? r + 1 : n_base); k++) {
+        struct gn_polar_box box;
+        if (r >= n_base &&
+            (p->regions[k].is_bright || gn_partition_plan_get_dark_cell(p->plan, k) != r - n_base))
+            continue;
+        gn_partition_plan_get_box(p->plan, k, &box);
+        for (int c = 0; c < 2; c++) {
+            out_box->low[c] = fmin(out_box->low[c], box.low[c]);
+            out_box->high[c] = fmax(out_box->high[c], box.high[c]);
+        }
+        n += list_texels(p, k, energy, items + n);
+    }
+    return n;
+}
+
+static bool is_cut_by_texels(const struct gn_partition *p, int r)
+{
+    return r >= p->plan->n_regions || !gn_partition_is_literal(p, GN_READ_BRIGHTEST);
+}
+
+/* One light of the whole. */
+static bool is_whole(const struct gn_partition *p, int r)
+{
+    bool is_from_brightest = gn_partition_is_literal(p, GN_READ_BRIGHTEST | GN_READ_BRIGHTEST_DIR);
+    return p->regions[r].n_parts == 1 && (r >= p->plan->n_regions || !is_from_brightest);
 }
 
 static void split_region(void *context, int r, int worker)
@@ -207,49 +243,65 @@ static void split_region(void *context, int r, int worker)
     struct gn_region *region = &p->regions[r];
     if (region->n_parts == 0)
         return;
-    if (region->n_parts == 1 &&
-        !gn_partition_is_literal(p, GN_READ_BRIGHTEST | GN_READ_BRIGHTEST_DIR)) {
+    if (is_whole(p, r)) {
         struct gn_light *light = &p->slots[region->first_slot];
         p->is_lit[region->first_slot] = gn_patch_get_light(&region->patch, light);
         light->id = get_region_id(p, region, 1);
         return;
     }
     struct gn_polar_box box;
-    gn_partition_plan_get_box(p->plan, r, &box);
     struct gn_split_options options = {.n_parts = region->n_parts,
                                        .is_midpoint = gn_partition_is_literal(p, GN_READ_MIDPOINT),
                                        .is_two_strips = p->settings->metric == GN_METRIC_TWICE};
     struct part_sink sink = {p, region, 0};
-    bool is_samples = gn_partition_is_literal(p, GN_READ_BRIGHTEST);
-    int n = is_samples ? region->n_items : list_texels(p, r);
-    gn_region_split(p->items + (is_samples ? p->sample_start[r] : p->plan->start[r]), n, &box,
-                    &options, take_part, &sink);
+    if (is_cut_by_texels(p, r)) {
+        int n = list_items(p, r, &box);
+        gn_region_split(p->items + region->first_item, n, &box, &options, take_part, &sink);
+        return;
+    }
+    gn_partition_plan_get_box(p->plan, r, &box);
+    gn_region_split(p->items + p->sample_start[r], region->n_items, &box, &options, take_part,
+                    &sink);
 }
 
-static int split_regions(struct gn_partition *p, struct gn_pool *pool, struct gn_light_list *list)
+static int split_regions(struct gn_partition *p, struct gn_pool *pool)
 {
-    int n_slots = 0, n_regions = p->plan->n_regions;
-    for (int r = 0; r < n_regions; r++) {
+    int n_slots = 0;
+    size_t n_items = 0;
+    for (int r = 0; r < p->n_regions; r++) {
         struct gn_region *region = &p->regions[r];
         region->first_slot = n_slots;
         region->n_slots = (int)region->n_parts;
+        region->first_item = n_items;
         n_slots += region->n_slots;
+        if (region->n_parts > 0 && !is_whole(p, r))
+            n_items += (size_t)region->patch.n_lit;
     }
     p->slots = calloc((size_t)n_slots + 1, sizeof(*p->slots));
     p->is_lit = calloc((size_t)n_slots + 1, sizeof(*p->is_lit));
     if (!gn_partition_is_literal(p, GN_READ_BRIGHTEST)) {
         free(p->items);
-        p->items = malloc((size_t)p->plan->start[n_regions] * sizeof(*p->items) + 1);
+        p->items = malloc(n_items * sizeof(*p->items) + 1);
     }
     if (!p->slots || !p->is_lit || !p->items)
         return -ENOMEM;
-    gn_pool_run(pool, n_regions, split_region, p);
-    for (int i = 0; i < n_slots; i++) {
-        int rc = p->is_lit[i] ? gn_light_list_add(list, &p->slots[i]) : 0;
-        if (rc < 0)
-            return rc;
-    }
+    gn_pool_run(pool, p->n_regions, split_region, p);
     return 0;
+}
+
+/* Moves the lights of these regions into the list; returns their number or -ENOMEM. */
+static int add_lights(const struct gn_partition *p, int first, int end, struct gn_light_list *list)
+{
+    int n = list->n;
+    for (int r = first; r < end; r++) {
+        const struct gn_region *region = &p->regions[r];
+        for (int i = region->first_slot; i < region->first_slot + region->n_slots; i++) {
+            int rc = p->is_lit[i] ? gn_light_list_add(list, &p->slots[i]) : 0;
+            if (rc < 0)
+                return rc;
+        }
+    }
+    return list->n - n;
 }
 
 /* The brightest sample's radiance has no solid angle; one factor for all lights makes their
@@ -269,22 +321,6 @@ static void scale_to_map(const struct gn_partition *p, struct gn_light_list *lis
             list->lights[i].irradiance[c] *= (float)(total / sum);
 }
 
-static int add_dark_lights(const struct gn_partition *p, struct gn_light_list *list,
-                           struct gn_light_figures *figures)
-{
-    for (int i = 0; i < p->plan->n_dark_cells; i++) {
-        struct gn_light light;
-        if (!gn_patch_get_light(&p->cells[i], &light))
-            continue;
-        light.id = GN_LIGHT_ID_DARK | (uint64_t)i;
-        int rc = gn_light_list_add(list, &light);
-        if (rc < 0)
-            return rc;
-        figures->n_dark_lights++;
-    }
-    return gn_light_list_add_fill(list, p->map, p->plan, &figures->n_fill_lights);
-}
-
 static int make_lights(struct gn_partition *p, struct gn_light_list *list,
                        struct gn_light_figures *figures)
 {
@@ -299,11 +335,17 @@ static int make_lights(struct gn_partition *p, struct gn_light_list *list,
     if (p->settings->metric != GN_METRIC_LOG2 && !gn_partition_is_literal(p, GN_READ_SAMPLE_MAX))
         p->max = get_smoothed_max(p->map);
     gn_partition_count_lights(p, figures);
-    int rc = split_regions(p, p->input->pool, list);
-    if (rc == 0 && gn_partition_is_literal(p, GN_READ_BRIGHTEST))
+    int rc = split_regions(p, p->input->pool), n_base = p->plan->n_regions;
+    if (rc == 0)
+        rc = add_lights(p, 0, n_base, list);
+    if (rc >= 0 && gn_partition_is_literal(p, GN_READ_BRIGHTEST))
         scale_to_map(p, list);
-    if (rc == 0 && !gn_partition_is_literal(p, GN_READ_DISCARD_DARK))
-        rc = add_dark_lights(p, list, figures);
+    if (rc >= 0 && !gn_partition_is_literal(p, GN_READ_DISCARD_DARK)) {
+        rc = add_lights(p, n_base, p->n_regions, list);
+        figures->n_dark_lights = rc < 0 ? 0 : rc;
+        if (rc >= 0)
+            rc = gn_light_list_add_fill(list, p->map, p->plan, &figures->n_fill_lights);
+    }
     return rc < 0 ? rc : gn_partition_remember(p, p->input->memory);
 }
 
@@ -316,21 +358,20 @@ int gn_partition_make_lights(const struct gn_light_input *input, struct gn_light
                              .map = input->map,
                              .settings = input->settings,
                              .plan = plan,
+                             .n_regions = plan->n_regions + plan->n_dark_cells,
                              .needs_samples = (input->settings->literal & sampled) != 0};
     figures->rings = plan->n_rings;
     figures->sectors = plan->division.sectors;
     figures->split_gain = 1;
     if (!(p.map->figures.mean_luminance > 0))
         return 0; // all black: no lights
-    p.regions = calloc((size_t)plan->n_regions, sizeof(*p.regions));
-    p.cells = calloc((size_t)plan->n_dark_cells, sizeof(*p.cells));
-    int rc = p.regions && p.cells ? make_lights(&p, list, figures) : -ENOMEM;
+    p.regions = calloc((size_t)p.n_regions, sizeof(*p.regions));
+    int rc = p.regions ? make_lights(&p, list, figures) : -ENOMEM;
     free(p.is_lit);
     free(p.slots);
     free(p.items);
     free(p.sample_start);
     gn_map_samples_finish(&p.samples);
-    free(p.cells);
     free(p.regions);
     return rc;
 }

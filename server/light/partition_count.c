@@ -74,44 +74,55 @@ static int64_t get_linear_parts(const struct gn_partition *p, const struct gn_re
 static int64_t choose_parts(struct gn_partition *p, const struct measure *m)
 {
     int64_t total = 0;
-    for (int r = 0; r < p->plan->n_regions; r++) {
+    for (int r = 0; r < p->n_regions; r++) {
         struct gn_region *region = &p->regions[r];
         region->n_parts = 0;
         if (!region->is_bright)
             continue;
         uint64_t mark = m->marks ? m->marks[r] : 0;
-        region->n_parts =
-            p->settings->metric == GN_METRIC_LOG2
-                ? clamp_parts(p, region, INT64_C(1) << count_halvings(region, m, mark))
-                : get_linear_parts(p, region);
+        if (p->settings->metric == GN_METRIC_LOG2)
+            region->n_parts = clamp_parts(p, region, INT64_C(1) << count_halvings(region, m, mark));
+        else
+            region->n_parts = r < p->plan->n_regions ? get_linear_parts(p, region) : 1;
         total += region->n_parts;
     }
     return total;
 }
 
-/* Tells bright regions; the rest is merged into coarser cells. Returns the number of lights that
- * are no bright region's. */
-static int64_t classify(struct gn_partition *p, const struct measure *m)
+/* Tells bright regions; the rest is merged into cells, which are bright where they hold light. */
+static void classify(struct gn_partition *p, const struct measure *m)
 {
-    int64_t n_others = 0;
-    memset(p->cells, 0, (size_t)p->plan->n_dark_cells * sizeof(*p->cells));
-    for (int r = 0; r < p->plan->n_regions; r++) {
+    int n_base = p->plan->n_regions;
+    struct gn_region *cells = p->regions + n_base;
+    memset(cells, 0, (size_t)p->plan->n_dark_cells * sizeof(*cells));
+    for (int r = 0; r < n_base; r++) {
         struct gn_region *region = &p->regions[r];
         region->is_bright = is_bright(p, m, r);
         if (!region->is_bright)
-            gn_patch_add(&p->cells[gn_partition_plan_get_dark_cell(p->plan, r)], &region->patch);
+            gn_patch_add(&cells[gn_partition_plan_get_dark_cell(p->plan, r)].patch, &region->patch);
     }
-    if (gn_partition_is_literal(p, GN_READ_DISCARD_DARK))
-        return 0;
-    for (int i = 0; i < p->plan->n_dark_cells; i++)
-        n_others += p->cells[i].energy > 0;
-    return n_others + (gn_luminance(p->map->fill) > 0 ? p->plan->n_fill_cells : 0);
+    double solid_angle = p->map->figures.shown_solid_angle / n_base;
+    for (int i = 0; i < p->plan->n_dark_cells; i++) {
+        double mean = cells[i].patch.energy / solid_angle; // as if in one region
+        cells[i].is_bright = mean > 0 && !gn_partition_is_literal(p, GN_READ_DISCARD_DARK);
+        cells[i].log_mean = mean > 0 ? log2(mean) : 0;
+        cells[i].n_items = cells[i].patch.n_lit;
+        if (gn_partition_is_literal(p, GN_READ_BRIGHTEST))
+            cells[i].n_items = 1; // samples are of regions
+    }
+}
+
+static int64_t count_fill(const struct gn_partition *p)
+{
+    bool has_fill =
+        gn_luminance(p->map->fill) > 0 && !gn_partition_is_literal(p, GN_READ_DISCARD_DARK);
+    return has_fill ? p->plan->n_fill_cells : 0;
 }
 
 /* The unit that brings the number nearest to the wanted one; without one, the mean. */
-static double find_log_unit(struct gn_partition *p, double log_mean, int64_t n_others)
+static double find_log_unit(struct gn_partition *p, double log_mean)
 {
-    int64_t wanted = p->settings->n_aim;
+    int64_t wanted = p->settings->n_aim, n_others = count_fill(p);
     struct measure m = {.log_unit = log_mean};
     double low = log_mean - 64, high = log_mean + 64;
     if (wanted == 0) {
@@ -135,8 +146,8 @@ static double find_log_unit(struct gn_partition *p, double log_mean, int64_t n_o
 static void measure_anew(struct gn_partition *p, struct measure *m)
 {
     *m = (struct measure){.mean = p->mean};
-    int64_t n_others = classify(p, m);
-    m->log_unit = find_log_unit(p, log2(p->mean), n_others);
+    classify(p, m);
+    m->log_unit = find_log_unit(p, log2(p->mean));
 }
 
 /* What the last frame was measured against, or on the way from there to this one's own. */
@@ -146,8 +157,8 @@ static void measure_by_last(struct gn_partition *p, const struct gn_light_memory
     struct measure fresh = {0}, kept = {.mean = last->figure[MEAN],
                                         .log_unit = last->figure[LOG_UNIT],
                                         .marks = last->marks};
-    int64_t n_others = classify(p, &kept);
-    int64_t n = choose_parts(p, &kept) + n_others;
+    classify(p, &kept);
+    int64_t n = choose_parts(p, &kept) + count_fill(p);
     double ratio = p->mean / kept.mean;
     if (p->settings->n_aim > 0)
         ratio = (double)n / p->settings->n_aim;
@@ -173,7 +184,7 @@ void gn_partition_count_lights(struct gn_partition *p, struct gn_light_figures *
     for (int r = 0; r < p->plan->n_regions; r++)
         p->regions[r].log_mean = p->regions[r].mean > 0 ? log2(p->regions[r].mean) : 0;
     if (p->settings->metric == GN_METRIC_LOG2) {
-        if (last && last->n_marks == p->plan->n_regions)
+        if (last && last->n_marks == p->n_regions)
             measure_by_last(p, last, &m);
         else
             measure_anew(p, &m);
@@ -192,14 +203,14 @@ int gn_partition_remember(const struct gn_partition *p, struct gn_light_memory *
 {
     if (p->settings->metric != GN_METRIC_LOG2)
         return 0;
-    memory->marks = malloc((size_t)p->plan->n_regions * sizeof(*memory->marks));
+    memory->marks = malloc((size_t)p->n_regions * sizeof(*memory->marks));
     if (!memory->marks)
         return -ENOMEM;
-    memory->n_marks = p->plan->n_regions;
+    memory->n_marks = p->n_regions;
     memory->figure[MEAN] = p->mean;
     memory->figure[LOG_UNIT] = p->log_unit;
     const struct measure m = {.log_unit = p->log_unit, .marks = p->marks};
-    for (int r = 0; r < p->plan->n_regions; r++) {
+    for (int r = 0; r < p->n_regions; r++) {
         const struct gn_region *region = &p->regions[r];
         uint64_t mark = m.marks ? m.marks[r] : 0;
         memory->marks[r] = region->is_bright ? 1 + (uint64_t)count_halvings(region, &m, mark) : 0;

@@ -11,7 +11,7 @@
 #include "server/light/method.h"
 #include "server/light/region_split.h"
 
-/** One base region. */
+/** One base region, or a cell of the dark ones. */
 struct gn_region {
     struct gn_patch patch; // its texels
     double mean;           // MLR
@@ -21,6 +21,7 @@ struct gn_region {
     int n_items;     // what can be told apart in it: lit texels, or samples
     int first_slot;  // of its lights
     int n_slots;
+    size_t first_item; // of its texels, where it is cut by them
 };
 
 /** One map's partition on the way. */
@@ -29,8 +30,8 @@ struct gn_partition {
     const struct gn_radiance_map *map;
     const struct gn_light_settings *settings;
     const struct gn_partition_plan *plan;
-    struct gn_region *regions; // [n_regions]
-    struct gn_patch *cells;    // [n_dark_cells] what bright regions leave
+    struct gn_region *regions; // [n_regions + n_dark_cells]: behind them what bright ones leave
+    int n_regions;             // cells included
     bool needs_samples;
     struct gn_map_samples samples;
     uint32_t *sample_start;      // [n_regions + 1] into sample_items
@@ -49,10 +50,12 @@ static inline bool gn_partition_is_literal(const struct gn_partition *p, unsigne
 }
 
 /**
- * Decides which regions are bright and how many parts each is cut into: regions' is_bright and
- * n_parts, the cells. In a stream decisions have hysteresis: what they are measured against is kept
- * while the number of lights fits, and each stays while it is within 5 %. The linear metrics, whose
- * number cannot be asked for, decide anew in each frame.
+ * Decides which regions are bright and how many parts each is cut into: is_bright and n_parts. The
+ * dark ones are merged into cells, a light each; with the metric log2 a cell that holds more light
+ * than the light of a bright region is cut as well, by its light per mean region. In a stream
+ * decisions have hysteresis: what they are measured against is kept while the number of lights
+ * fits, and each stays while it is within 5 %. The linear metrics, whose number cannot be asked
+ * for, decide anew in each frame.
  */
 void gn_partition_count_lights(struct gn_partition *p, struct gn_light_figures *figures);
 /** What the next frame is to know. Returns 0 or -ENOMEM. */

@@ -77,13 +77,13 @@ enum gn_partition_reading {
     "plain-sampling|brightest-direction"
 /** Names of enum gn_partition_metric and of enum gn_light_weights, as lists of choices. */
 #define GN_METRIC_NAMES "default|pow2|twice|log2"
-#define GN_WEIGHTS_NAMES "equal|density|partition"
+#define GN_WEIGHTS_NAMES "partition|equal|density"
 
 /** How the power is shared out among importance samples. */
 enum gn_light_weights {
-    GN_WEIGHTS_EQUAL = 0,     // all the same power, in the colour about the sample (W1)
-    GN_WEIGHTS_DENSITY = 1,   // radiance over samples per steradian (W2)
-    GN_WEIGHTS_PARTITION = 2, // each texel's light to its nearest sample (W3)
+    GN_WEIGHTS_PARTITION = 0, // the default: each texel's light to its nearest sample (W3)
+    GN_WEIGHTS_EQUAL = 1,     // all the same power, in the colour about the sample (W1)
+    GN_WEIGHTS_DENSITY = 2,   // radiance over samples per steradian (W2)
     GN_WEIGHTS_COUNT
 };
 
@@ -103,7 +103,7 @@ struct gn_light_options {
     enum gn_partition_metric metric; // default log2 (energy) or 2^k (seed)
     unsigned literal; // GN_READ_* taken to the letter besides the method's own (seed: GN_READ_SEED)
     unsigned mended;  // GN_READ_* not taken to the letter after all
-    enum gn_light_weights weights; // of importance samples as lights; default equal
+    enum gn_light_weights weights; // of importance samples as lights; default partition
     bool relaxed;  // importance samples moved by the correction table: evener, but they move
                    // with the light: for still pictures, not for streams
     bool no_discs; // small suns go through the method too (it is so in `seed`)

@@ -121,9 +121,9 @@ static const struct gn_option table[] = {
     {.key = "light-weights",
      .type = GN_OPTION_ENUM,
      .choices = GN_WEIGHTS_NAMES,
-     .default_value = "equal",
-     .help = "What each importance sample stands for (penrose): the same power; its radiance over "
-             "the samples' density; or the light of all texels nearest to it."},
+     .default_value = "partition",
+     .help = "What each importance sample stands for (penrose): the light of all texels nearest "
+             "to it; the same power; or its radiance over the samples' density."},
     {.key = "light-relaxed",
      .type = GN_OPTION_BOOL,
      .default_value = "true",

@@ -174,7 +174,7 @@ def test_threads_give_the_same_bits():
 def test_qualities_and_methods_run():
     for options in (['--quality', 'seed'], ['--quality', 'seed', '--shading', 'irradiance'],
                     ['--light-method', 'penrose', '--lights', '16'],
-                    ['--light-method', 'penrose', '--light-weights', 'partition',
+                    ['--light-method', 'penrose', '--light-weights', 'equal',
                      '--no-light-relaxed'],
                     ['--light-literal', 'sample-mean,strict', '--light-mended', 'strict',
                      '--light-metric', 'twice', '--light-rings', '2', '--light-sectors', '5',

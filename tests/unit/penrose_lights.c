@@ -46,7 +46,7 @@ static void make_room(struct light_fixture *f, enum gn_projection_type type, int
 static void weights_add_up_to_the_map(void **unused)
 {
     (void)unused;
-    static const double tolerance[GN_WEIGHTS_COUNT] = {1e-5, 0.06, 1e-5};
+    static const double tolerance[GN_WEIGHTS_COUNT] = {1e-5, 1e-5, 0.06};
     for (int type = 0; type < 2; type++) {
         struct light_fixture f;
         make_room(&f, type ? GN_PROJECTION_LATLONG : GN_PROJECTION_FISHEYE_EQUIDISTANT,
@@ -81,7 +81,8 @@ static void the_partition_is_by_the_nearest_sample(void **unused)
     f.frame.projection.radius = 39.217;
     f.frame.projection.focal = 0;
     light_fixture_fill(&f, light_fixture_room);
-    struct gn_light_options options = {.method = GN_LIGHT_PENROSE, .n_lights = 90};
+    struct gn_light_options options = {
+        .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_EQUAL, .n_lights = 90};
     struct gn_lighting_state *sites = make_state(&f, &options, NULL);
     options.weights = GN_WEIGHTS_PARTITION;
     struct gn_lighting_state *state = make_state(&f, &options, NULL);
@@ -203,7 +204,7 @@ static void a_blinking_lamp_moves_no_other_sample(void **unused)
 {
     (void)unused;
     struct light_fixture f;
-    struct gn_light_options options = {.method = GN_LIGHT_PENROSE};
+    struct gn_light_options options = {.method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_EQUAL};
     make_room(&f, GN_PROJECTION_LATLONG, 128, 64);
     set_lamp(&f, 0.2f);
     struct gn_lighting_state *state = make_state(&f, &options, NULL);
