@@ -135,9 +135,11 @@ static bool are_codes_same(const struct gn_worked_frame *worked, const uint8_t *
     return true;
 }
 
+/* Never where one is NaN or the old one infinite or below 0. */
 static bool are_values_same(float old, float now, double noise)
 {
-    return fabs((double)now - (double)old) <= noise * (double)old; // false for NaN, and below 0
+    double bound = noise * (double)old;
+    return bound < INFINITY && fabs((double)now - (double)old) <= bound;
 }
 
 static bool are_floats_same(const uint8_t *a, const uint8_t *b, size_t n, double noise)
