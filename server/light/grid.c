@@ -41,23 +41,60 @@ static void find_cells_of_row(void *context, int y, int worker)
     }
 }
 
-/* The number of runs, and by cell in start[cell + 1]; or, with runs, lists them from next[cell]. */
-static void list_runs(const struct addressing *a, uint32_t *next, struct gn_grid_run *runs)
+static int get_quarter(const struct gn_grid_plan *plan, uint32_t cell)
 {
-    size_t width = (size_t)a->plan->table->projection.width;
-    size_t n = width * (size_t)a->plan->table->projection.height;
+    uint32_t side = (uint32_t)plan->side, half = side / 2;
+    return (cell % side >= half) + 2 * (cell / side >= half);
+}
+
+/* Where the next run of a cell, and of a quarter, belongs. */
+struct next_runs {
+    uint32_t *of_cell, of_quarter[GN_GRID_QUARTERS];
+};
+
+/* Counts the runs; or lists them, where there is memory. */
+static void list_runs(const struct addressing *a, struct next_runs *next)
+{
+    struct gn_grid_plan *plan = a->plan;
+    size_t width = (size_t)plan->table->projection.width;
+    size_t n = width * (size_t)plan->table->projection.height;
     for (size_t i = 0; i < n;) {
         uint32_t cell = a->cell[i];
         size_t end = i + 1, row_end = i - i % width + width;
         while (end < row_end && a->cell[end] == cell)
             end++;
         if (cell != NO_CELL) {
-            if (runs)
-                runs[next[cell]] = (struct gn_grid_run){(uint32_t)i, (uint32_t)(end - i)};
-            next[cell]++;
+            uint32_t *of_cell = &next->of_cell[cell];
+            uint32_t *of_quarter = &next->of_quarter[get_quarter(plan, cell)];
+            const struct gn_grid_run run = {(uint32_t)i, (uint32_t)(end - i), cell};
+            if (plan->run) {
+                plan->run[*of_cell] = run;
+                plan->in_order[*of_quarter] = run;
+            }
+            ++*of_cell;
+            ++*of_quarter;
         }
         i = end;
     }
+}
+
+/* Turns counts into places, and gets memory. */
+static int place_runs(struct gn_grid_plan *plan, struct next_runs *next)
+{
+    uint32_t n = 0;
+    for (int c = 0; c < plan->side * plan->side; c++) {
+        plan->start[c] = n;
+        n += next->of_cell[c];
+        next->of_cell[c] = plan->start[c];
+    }
+    plan->start[plan->side * plan->side] = n;
+    for (int q = 0; q < GN_GRID_QUARTERS; q++) {
+        plan->quarter_start[q + 1] = plan->quarter_start[q] + next->of_quarter[q];
+        next->of_quarter[q] = plan->quarter_start[q];
+    }
+    plan->run = malloc(n * sizeof(*plan->run) + 1);
+    plan->in_order = malloc(n * sizeof(*plan->in_order) + 1);
+    return plan->run && plan->in_order ? 0 : -ENOMEM;
 }
 
 static int sort_texels(struct gn_grid_plan *plan, struct gn_pool *pool)
@@ -65,23 +102,18 @@ static int sort_texels(struct gn_grid_plan *plan, struct gn_pool *pool)
     const struct gn_projection *p = &plan->table->projection;
     size_t n_cells = (size_t)plan->side * (size_t)plan->side;
     struct addressing a = {plan, malloc((size_t)p->width * (size_t)p->height * sizeof(*a.cell))};
-    uint32_t *next = calloc(n_cells, sizeof(*next));
-    plan->start = calloc(n_cells + 1, sizeof(*plan->start));
-    int rc = a.cell && next && plan->start ? 0 : -ENOMEM;
+    struct next_runs next = {.of_cell = calloc(n_cells, sizeof(*next.of_cell))};
+    plan->start = malloc((n_cells + 1) * sizeof(*plan->start));
+    int rc = a.cell && next.of_cell && plan->start ? 0 : -ENOMEM;
     if (rc == 0) {
         gn_pool_run(pool, p->height, find_cells_of_row, &a);
-        list_runs(&a, next, NULL);
-        for (size_t c = 0; c < n_cells; c++) {
-            plan->start[c + 1] = plan->start[c] + next[c];
-            next[c] = plan->start[c];
-        }
-        plan->run = malloc(plan->start[n_cells] * sizeof(*plan->run) + 1);
-        rc = plan->run ? 0 : -ENOMEM;
+        list_runs(&a, &next);
+        rc = place_runs(plan, &next);
     }
     if (rc == 0)
-        list_runs(&a, next, plan->run);
+        list_runs(&a, &next);
     free(a.cell);
-    free(next);
+    free(next.of_cell);
     return rc;
 }
 
@@ -142,15 +174,16 @@ static int list_fill(struct gn_grid_plan *plan)
     return 0;
 }
 
-/* About as many cells as a map of this resolution needs texels for the whole sphere. */
+/* A quarter as many cells as a map of this resolution needs texels for the whole sphere; the
+ * finest, whose cells cost as much as their texels, for eight texels a cell. */
 static int choose_side(const struct gn_map_table *t)
 {
     double n = (double)t->projection.width * (double)t->projection.height;
     double whole = t->shown_solid_angle > 0 ? n * 4 * pi / t->shown_solid_angle : n;
     int side = 8;
-    while (side < GN_GRID_SIDE_MAX && (double)side * side < whole)
+    while (side < GN_GRID_SIDE_MAX / 2 && 4.0 * side * side < whole)
         side *= 2;
-    return side;
+    return whole >= 8.0 * GN_GRID_SIDE_MAX * GN_GRID_SIDE_MAX ? GN_GRID_SIDE_MAX : side;
 }
 
 static int fill_plan(struct gn_grid_plan *plan, struct gn_pool *pool)
@@ -201,26 +234,47 @@ void gn_grid_plan_unref(struct gn_grid_plan **plan)
         return;
     free(p->fill);
     free(p->dir_world);
+    free(p->in_order);
     free(p->run);
     free(p->start);
     gn_map_table_unref(&p->table);
     free(p);
 }
 
-static void add_texel(const struct gn_radiance_map *map, size_t i, struct gn_grid_cell *cell)
+/* Adds n texels that follow each other. They are few: in float, their sums are good to 1e-6, and
+ * there is no faster way to read a map. */
+static void add_texels(const struct gn_radiance_map *map, size_t first, size_t n,
+                       struct gn_grid_cell *cell)
 {
-    const float *l = map->radiance.data + 3 * i, *d = map->direction_world + 3 * i;
-    double w = (double)map->solid_angle[i];
-    double r = (double)l[0] * w, g = (double)l[1] * w, b = (double)l[2] * w;
-    double energy = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    cell->irradiance[0] += r;
-    cell->irradiance[1] += g;
-    cell->irradiance[2] += b;
-    cell->energy += energy;
-    cell->toward[0] += energy * (double)d[0];
-    cell->toward[1] += energy * (double)d[1];
-    cell->toward[2] += energy * (double)d[2];
-    cell->own_spread += energy * w;
+    const float *l = map->radiance.data + 3 * first, *d = map->direction_world + 3 * first;
+    const float *weight = map->solid_angle + first;
+    float r = 0, g = 0, b = 0, x = 0, y = 0, z = 0, spread = 0;
+    for (size_t i = 0; i < n; i++, l += 3, d += 3) {
+        float w = weight[i], tr = l[0] * w, tg = l[1] * w, tb = l[2] * w;
+        float energy = 0.2126f * tr + 0.7152f * tg + 0.0722f * tb;
+        r += tr;
+        g += tg;
+        b += tb;
+        x += energy * d[0];
+        y += energy * d[1];
+        z += energy * d[2];
+        spread += energy * w;
+    }
+    cell->irradiance[0] += (double)r;
+    cell->irradiance[1] += (double)g;
+    cell->irradiance[2] += (double)b;
+    cell->toward[0] += (double)x;
+    cell->toward[1] += (double)y;
+    cell->toward[2] += (double)z;
+    cell->own_spread += (double)spread;
+}
+
+/* After all texels are added. */
+static void finish_cell(struct gn_grid_cell *cell)
+{
+    const double *e = cell->irradiance;
+    cell->energy = 0.2126 * e[0] + 0.7152 * e[1] + 0.0722 * e[2];
+    cell->own_spread /= 4 * pi;
 }
 
 static struct gn_grid_cell get_fill(const struct gn_grid *grid, int cell)
@@ -236,23 +290,25 @@ static struct gn_grid_cell get_fill(const struct gn_grid *grid, int cell)
     return sum;
 }
 
-static void sum_row(void *context, int y, int worker)
+static void sum_quarter(void *context, int quarter, int worker)
 {
     (void)worker;
     struct gn_grid *grid = context;
     const struct gn_grid_plan *plan = grid->plan;
     bool has_fill = plan->fill && gn_luminance(grid->map->fill) > 0;
-    for (int i = y * grid->side; i < (y + 1) * grid->side; i++) {
-        struct gn_grid_cell sum = {0};
-        for (uint32_t k = plan->start[i]; k < plan->start[i + 1]; k++)
-            for (uint32_t t = 0; t < plan->run[k].n; t++)
-                add_texel(grid->map, plan->run[k].texel + t, &sum);
-        sum.own_spread /= 4 * pi;
-        if (has_fill && plan->fill[i][0] > 0) {
-            struct gn_grid_cell fill = get_fill(grid, i);
-            gn_grid_cell_add(&sum, &fill);
+    for (uint32_t k = plan->quarter_start[quarter]; k < plan->quarter_start[quarter + 1]; k++) {
+        const struct gn_grid_run *run = &plan->in_order[k];
+        add_texels(grid->map, run->texel, run->n, &grid->cell[run->cell]);
+    }
+    for (int y = 0, half = grid->side / 2; y < half; y++) {
+        int first = (quarter / 2 * half + y) * grid->side + quarter % 2 * half;
+        for (int i = first; i < first + half; i++) {
+            finish_cell(&grid->cell[i]);
+            if (has_fill && plan->fill[i][0] > 0) {
+                struct gn_grid_cell fill = get_fill(grid, i);
+                gn_grid_cell_add(&grid->cell[i], &fill);
+            }
         }
-        grid->cell[i] = sum;
     }
 }
 
@@ -264,10 +320,10 @@ int gn_grid_init(struct gn_grid *grid, const struct gn_light_input *input)
         return rc;
     grid->plan = input->memory->grid;
     grid->side = grid->plan->side;
-    grid->cell = malloc((size_t)grid->side * (size_t)grid->side * sizeof(*grid->cell));
+    grid->cell = calloc((size_t)grid->side * (size_t)grid->side, sizeof(*grid->cell));
     if (!grid->cell)
         return -ENOMEM;
-    gn_pool_run(input->pool, grid->side, sum_row, grid);
+    gn_pool_run(input->pool, GN_GRID_QUARTERS, sum_quarter, grid);
     return 0;
 }
 
@@ -320,8 +376,8 @@ int gn_grid_list_items(const struct gn_grid *grid, int cell, struct gn_grid_cell
     for (uint32_t k = plan->start[cell]; k < plan->start[cell + 1]; k++) {
         for (uint32_t t = 0; t < plan->run[k].n; t++) {
             struct gn_grid_cell item = {0};
-            add_texel(grid->map, plan->run[k].texel + t, &item);
-            item.own_spread /= 4 * pi;
+            add_texels(grid->map, plan->run[k].texel + t, 1, &item);
+            finish_cell(&item);
             if (item.energy > 0)
                 out_items[n++] = item;
         }

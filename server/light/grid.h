@@ -14,9 +14,12 @@
 /** Most cells of a side. */
 #define GN_GRID_SIDE_MAX 256
 
-/** Texels in a row of the map, in one cell. */
+/** Quarters of the square, a quarter turn of the sky each. */
+#define GN_GRID_QUARTERS 4
+
+/** n texels in a row of the map, in one cell. */
 struct gn_grid_run {
-    uint32_t texel, n;
+    uint32_t texel, n, cell;
 };
 
 /** Which texels lie in which cell: depends on no pixel. Thread-safety: immutable after create;
@@ -24,12 +27,14 @@ struct gn_grid_run {
 struct gn_grid_plan {
     _Atomic int references;
     struct gn_map_table *table; // shared (ref)
-    int side;                   // a power of two: about as many cells as the sphere has texels
+    int side;                   // a power of two
     uint32_t *start;            // [side * side + 1] into run; cells row by row, owned
-    struct gn_grid_run *run;    // owned
-    float (*dir_world)[3];      // [side * side] unit, of the cells' middles, owned
-    float (*fill)[4];           // [side * side] sr not shown, and its integral of the direction,
-                                // owned; NULL: all is shown
+    struct gn_grid_run *run;    // by cell, owned
+    uint32_t quarter_start[GN_GRID_QUARTERS + 1]; // into the following
+    struct gn_grid_run *in_order; // by quarter, then by texel: as memory is read fastest, owned
+    float (*dir_world)[3];        // [side * side] unit, of the cells' middles, owned
+    float (*fill)[4];             // [side * side] sr not shown, and its integral of the direction,
+                                  // owned; NULL: all is shown
 };
 void gn_grid_plan_unref(struct gn_grid_plan **plan);
 

@@ -12,6 +12,10 @@
 /* A rectangle of no more cells and items is cut between texels, whose halves are more even. */
 enum { FEW_CELLS = 64, FEW_ITEMS = 256 };
 
+/* Halves of a median cut that differ by more of the whole are cut across the shorter side, where
+ * that is evener. */
+static const double uneven = 0.1;
+
 /* A rectangle of cells [low, high), or, where n_items > 0, some of a cell's texels. */
 struct region {
     int low[2], high[2]; // x, y
@@ -325,7 +329,7 @@ static int cut_region(struct cutting *c, struct region *r, struct region *far)
         double cost[2] = {INFINITY, INFINITY};
         int longer = get_length(c->grid, r, 1) > get_length(c->grid, r, 0);
         cost[longer] = find_place(c, r, longer, &at[longer]);
-        if (!c->cutter->is_median || !isfinite(cost[longer]))
+        if (!c->cutter->is_median || cost[longer] > uneven * r->urgency)
             cost[!longer] = find_place(c, r, !longer, &at[!longer]);
         int axis = cost[!longer] < cost[longer] ? !longer : longer;
         if (!isfinite(cost[axis]))

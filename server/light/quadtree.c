@@ -117,11 +117,10 @@ static int add_leaves(const struct tree *t, int level, int x, int y)
     return gn_light_list_add(t->list, &light);
 }
 
-/* The smallest threshold that gives no more than n lights, were there no last frame. */
+/* The smallest threshold that gives no more than n lights. */
 static double find_threshold(struct tree t, int n)
 {
     double low = 0, high = 2 * t.energy[0];
-    t.was_split = NULL;
     for (int i = 0; i < 40; i++) {
         t.threshold = 0.5 * (low + high);
         if (t.threshold > 0 && count_leaves(&t, 0, 0, 0, n) <= n)

@@ -215,13 +215,183 @@ static void median_cut_halves_energy(void **unused)
     light_fixture_fill(&f, light_fixture_room);
     for (int n = 2; n <= 256; n *= 2) {
         struct gn_lighting_state *state = make_state(&f, GN_LIGHT_MEDIAN_CUT, n, NULL, NULL);
-        double least = gn_luminance(state->lights[n - 1].irradiance);
-        double most = gn_luminance(state->lights[0].irradiance);
-        printf("# %d lights: the strongest is %.3f of the weakest\n", n, most / least);
-        // A cut lies between cells, and a lamp here is 8 to 16 cells wide.
-        assert_true(most / least < (n <= 8 ? 1.1 : 2.5));
+        double sum = 0, most = gn_luminance(state->lights[0].irradiance);
+        for (int i = 0; i < n; i++)
+            sum += gn_luminance(state->lights[i].irradiance);
+        printf("# %d lights: the strongest has %.3f of the mean\n", n, most * n / sum);
+        // A large region is cut between cells, and a lamp here is 4 to 8 cells wide.
+        assert_true(most * n / sum < (n <= 8 ? 1.05 : 1.6));
         gn_lighting_state_unref(&state);
     }
+    light_fixture_finish(&f);
+}
+
+/* Lights of both states whose identity the other has not. */
+static int count_changes(const struct gn_lighting_state *a, const struct gn_lighting_state *b)
+{
+    int n = 0;
+    for (int i = 0; i < a->n_lights; i++)
+        n += !find_id(b, a->lights[i].id);
+    for (int i = 0; i < b->n_lights; i++)
+        n += !find_id(a, b->lights[i].id);
+    return n;
+}
+
+static bool is_near(const float dir[static 3], double x, double y, double z, double cosine)
+{
+    return (double)dir[0] * x + (double)dir[1] * y + (double)dir[2] * z > cosine;
+}
+
+static void quadtree_leaves_the_others_where_they_were(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
+    light_fixture_fill(&f, light_fixture_room);
+    struct gn_lighting_state *before = make_state(&f, GN_LIGHT_QUADTREE, 64, NULL, NULL);
+    // A new lamp, an eighth as strong as all the light before
+    for (int y = 60; y < 66; y++) {
+        for (int x = 100; x < 106; x++) {
+            double w = gn_projection_get_solid_angle(&f.frame.projection, x, y);
+            for (int c = 0; c < 3; c++)
+                gn_image_at(&f.image, x, y)[c] = (float)(before->total_irradiance[c] / 8 / 36 / w);
+        }
+    }
+    struct gn_lighting_state *after = make_state(&f, GN_LIGHT_QUADTREE, 64, before, NULL);
+    double lamp[3];
+    assert_true(gn_projection_get_direction(&f.frame.projection, 103, 63, lamp));
+    int n_same = 0, n_other = 0;
+    for (int i = 0; i < before->n_lights; i++) {
+        const struct gn_light *light = &before->lights[i], *next = find_id(after, light->id);
+        bool is_same =
+            next && memcmp(light->dir_world, next->dir_world, sizeof(light->dir_world)) == 0;
+        bool is_beside = is_near(light->dir_world, lamp[0], lamp[1], lamp[2], 0.9);
+        assert_true(is_same || is_beside);
+        n_same += is_same;
+        n_other += !is_same;
+    }
+    printf("# a lamp comes on: %d lights stay to the bit, %d change, then %d lights\n", n_same,
+           n_other, after->n_lights);
+    assert_true(n_same > 50 && after->n_lights > before->n_lights);
+    gn_lighting_state_unref(&before);
+    gn_lighting_state_unref(&after);
+    light_fixture_finish(&f);
+}
+
+static double get_random(uint32_t *seed) // [-1, 1]
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return (double)(*seed >> 8) / 8388608.0 - 1;
+}
+
+static void quadtree_is_calm_in_noise(void **unused)
+{
+    (void)unused;
+    enum { N_FRAMES = 30 };
+    struct light_fixture clean, f;
+    uint32_t seed = 1;
+    assert_int_equal(light_fixture_init(&clean, GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200), 0);
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200), 0);
+    light_fixture_fill(&clean, light_fixture_room);
+    light_fixture_fill(&f, light_fixture_room);
+    struct gn_lighting_state *last = NULL;
+    int n_changes = 0;
+    for (int frame = 0; frame < N_FRAMES; frame++) {
+        double gain = 1 + 0.01 * get_random(&seed); // all together, and each
+        for (int i = 0; i < 3 * 200 * 200; i++)
+            f.image.data[i] = clean.image.data[i] * (float)(gain * (1 + 0.017 * get_random(&seed)));
+        f.frame.capture_time_ns = (int64_t)frame * 33333333;
+        struct gn_lighting_state *state = make_state(&f, GN_LIGHT_QUADTREE, 64, last, NULL);
+        n_changes += last ? count_changes(last, state) : 0;
+        gn_lighting_state_unref(&last);
+        last = state;
+    }
+    printf("# noise of 1 %%: %d births and deaths in %d frames\n", n_changes, N_FRAMES);
+    assert_true(n_changes < N_FRAMES);
+    gn_lighting_state_unref(&last);
+    light_fixture_finish(&clean);
+    light_fixture_finish(&f);
+}
+
+static void quadtree_comes_back_to_its_number(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200), 0);
+    light_fixture_fill(&f, light_fixture_room);
+    struct gn_lighting_state *last = make_state(&f, GN_LIGHT_QUADTREE, 64, NULL, NULL);
+    int counts[121];
+    for (int frame = 1; frame <= 120; frame++) { // light falls to a half: a stop down
+        for (int i = 0; i < 3 * 200 * 200 && frame == 1; i++)
+            f.image.data[i] *= 0.5f;
+        f.frame.capture_time_ns = (int64_t)frame * 33333333;
+        struct gn_lighting_state *state = make_state(&f, GN_LIGHT_QUADTREE, 64, last, NULL);
+        counts[frame] = state->n_lights;
+        gn_lighting_state_unref(&last);
+        last = state;
+    }
+    printf("# half the light: %d lights at once, %d after 1 s, %d after 4 s\n", counts[1],
+           counts[30], counts[120]);
+    assert_true(counts[1] < 48 && counts[30] > counts[1]);
+    assert_near(counts[120], 64, 17);
+    for (int i = 0; i < 3 * 200 * 200; i++)
+        f.image.data[i] *= 8; // far more: no frame may have more than twice the number
+    struct gn_lighting_state *state = make_state(&f, GN_LIGHT_QUADTREE, 64, last, NULL);
+    assert_near(state->n_lights, 64, 24);
+    gn_lighting_state_unref(&last);
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+static void inversion_spreads_evenly(void **unused)
+{
+    (void)unused;
+    enum { RINGS = 8, SECTORS = 8, N = 1024 };
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
+    light_fixture_fill(&f, light_fixture_constant);
+    struct gn_lighting_state *state = make_state(&f, GN_LIGHT_INVERSION, N, NULL, NULL);
+    int bins[RINGS][SECTORS] = {{0}}, caps[2] = {0};
+    for (int i = 0; i < state->n_lights; i++) {
+        const float *d = state->lights[i].dir_world;
+        double phi = atan2((double)d[1], (double)d[0]) + pi;
+        int ring = (int)fmin((1 - (double)d[2]) / 2 * RINGS, RINGS - 1);
+        bins[ring][(int)fmin(phi / (2 * pi) * SECTORS, SECTORS - 1)]++;
+        caps[0] += (double)d[2] > 0.96; // a fiftieth of the sphere each
+        caps[1] += (double)d[2] < -0.96;
+    }
+    double chi2 = 0, expected = (double)N / (RINGS * SECTORS);
+    for (int i = 0; i < RINGS * SECTORS; i++) {
+        double d = bins[i / SECTORS][i % SECTORS] - expected;
+        chi2 += d * d / expected;
+    }
+    printf("# %d points, chi^2 of 64 equal bins %.1f (random: 63), caps %d and %d (20.5)\n",
+           state->n_lights, chi2, caps[0], caps[1]);
+    assert_int_equal(state->n_lights, N);
+    assert_true(chi2 < 30); // far below random points' 63 +- 11: well spread
+    assert_near(caps[0], N / 50.0, 3 * sqrt(N / 50.0));
+    assert_near(caps[1], N / 50.0, 3 * sqrt(N / 50.0));
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+static void inversion_keeps_identities(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 200, 200), 0);
+    light_fixture_fill(&f, light_fixture_room);
+    struct gn_lighting_state *a = make_state(&f, GN_LIGHT_INVERSION, 64, NULL, NULL);
+    for (int i = 0; i < 3 * 200 * 200; i++)
+        f.image.data[i] *= 1e6f;
+    struct gn_lighting_state *b = make_state(&f, GN_LIGHT_INVERSION, 64, a, NULL);
+    assert_int_equal(count_changes(a, b), 0);
+    for (int i = 0; i < a->n_lights; i++) {
+        const struct gn_light *next = find_id(b, a->lights[i].id);
+        assert_near(get_angle(a->lights[i].dir_world, next->dir_world), 0, 1e-5);
+    }
+    gn_lighting_state_unref(&a);
+    gn_lighting_state_unref(&b);
     light_fixture_finish(&f);
 }
 
@@ -261,6 +431,11 @@ int main(void)
         cmocka_unit_test(every_method_has_the_same_bits_on_threads),
         cmocka_unit_test(median_cut_halves_energy),
         cmocka_unit_test(variance_keeps_a_lamp_whole),
+        cmocka_unit_test(quadtree_leaves_the_others_where_they_were),
+        cmocka_unit_test(quadtree_is_calm_in_noise),
+        cmocka_unit_test(quadtree_comes_back_to_its_number),
+        cmocka_unit_test(inversion_spreads_evenly),
+        cmocka_unit_test(inversion_keeps_identities),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
