@@ -42,7 +42,8 @@ static int read_inputs(const struct gn_cli_request *request, struct run *run,
     start_ns = gn_clock_get_monotonic_ns();
     if (ret == 0) {
         gn_render_get_needs(run->scene, &request->render, &run->needs);
-        ret = gn_cli_read_light(request, &run->needs, run->pool, &run->light, out_error);
+        ret =
+            gn_cli_make_light(request, run->scene, &run->needs, run->pool, &run->light, out_error);
     }
     run->ms_light = get_ms_since(start_ns);
     return ret;

@@ -35,7 +35,9 @@ struct gn_cli_request {
     double world_from_env[4]; // quaternion w, x, y, z
     struct gn_light_options light;
     struct gn_render_options render;
-    int n_threads; // 0: one per processor
+    int n_emitter_pieces; // 0: the default
+    const char *emission; // NAME=FILE; may be NULL
+    int n_threads;        // 0: one per processor
 };
 
 /**
@@ -54,6 +56,12 @@ void gn_cli_request_finish(struct gn_cli_request *request);
 GN_MUST_USE int gn_cli_read_light(const struct gn_cli_request *request,
                                   const struct gn_render_needs *needs, struct gn_pool *pool,
                                   struct gn_lighting_state **out_state, struct gn_error *out_error);
+
+/** The light of the environment picture, where there is one, and of the scene's own emitters. */
+GN_MUST_USE int gn_cli_make_light(const struct gn_cli_request *request,
+                                  const struct gn_scene *scene, const struct gn_render_needs *needs,
+                                  struct gn_pool *pool, struct gn_lighting_state **out_state,
+                                  struct gn_error *out_error);
 
 /** The camera picture: as linear radiance, and as its codes where it has 8 bits. */
 struct gn_cli_background {

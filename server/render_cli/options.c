@@ -18,9 +18,10 @@ static const struct gn_option table[] = {
      .help = "scene.json: the real and virtual objects."},
     {.key = "env",
      .value_name = "FILE",
-     .is_required = true,
-     .help = "The light: an environment picture. EXR and Radiance files are linear; the codes of "
-             "PNG and JPEG need a response in --env-params."},
+     .help =
+         "The light: an environment picture; only a scene with light of its own may do without. "
+         "EXR and Radiance files are linear; the codes of "
+         "PNG and JPEG need a response in --env-params."},
     {.key = "env-projection",
      .type = GN_OPTION_ENUM,
      .choices = GN_PROJECTION_NAMES,
@@ -136,6 +137,16 @@ static const struct gn_option table[] = {
      .type = GN_OPTION_BOOL,
      .default_value = "true",
      .help = "What real objects already shade is not shaded again; --quality seed: it is."},
+    {.key = "emitter-pieces",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = GN_NEAR_LIGHTS_MAX,
+     .value_name = "N",
+     .help = "Into how many lights the scene's emissive meshes are cut together; without it 32."},
+    {.key = "emission",
+     .value_name = "NAME=FILE",
+     .help = "A still picture for the meshes with that emission_stream: PNG and JPEG as sRGB, EXR "
+             "and Radiance files linear."},
     {.key = "bounces",
      .type = GN_OPTION_INT,
      .min = 0,
@@ -192,7 +203,7 @@ static const struct gn_option table[] = {
 
 const struct gn_program gn_cli_program = {
     .name = "gnomon-render",
-    .usage = "--scene FILE --env FILE --camera FILE --out FILE [OPTION]...",
+    .usage = "--scene FILE [--env FILE] --camera FILE --out FILE [OPTION]...",
     .summary = "Renders virtual objects into one camera picture, lit by an environment picture, "
                "with the shadows they cast on real objects.",
     .notes = "Examples:\n"
@@ -271,6 +282,9 @@ static void read_paths(struct gn_cli_request *request)
 {
     request->scene = get_path(request, "scene");
     request->env = get_path(request, "env");
+    request->emission = get_path(request, "emission");
+    if (is_set(request, "emitter-pieces"))
+        request->n_emitter_pieces = get_int(request, "emitter-pieces");
     request->env_params = get_path(request, "env-params");
     request->camera = get_path(request, "camera");
     request->background = get_path(request, "background");
