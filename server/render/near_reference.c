@@ -7,7 +7,7 @@
  * theta_i the angle between neighbouring corners as seen from the point, c_i the unit normal of
  * their plane with it. Source: Lambert, Photometria, 1760; as Baum, Rushmeier and Winget,
  * "Improving Radiosity Solutions through the Use of Analytically Determined Form-Factors", SIGGRAPH
- * 1989, eq. 3. From 16 radii on it is a disc's (off by less than 1e-3). Visibility is that of one
+ * 1989, eq. 3. From 64 radii on it is a disc's (off by about 1e-4). Visibility is that of one
  * random point of each piece, the pieces being the strata; of a lamp's sphere, of 16.
  */
 #include "server/render/near.h"
@@ -18,7 +18,7 @@
 #include "server/render/internal.h"
 
 /** Radii from which on a piece is a disc. */
-#define FAR_RADII 16
+#define FAR_RADII 64
 /** A lamp's sphere is tried in SIDE x SIDE strata. */
 #define SIDE 4
 /** Tries to find a point of a piece above the horizon. */

@@ -287,6 +287,8 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         return;
     if (frame->run_blockers)
         find_hidden(frame, scratch, figures);
+    if (frame->run_blockers && frame->near.n_real > 0)
+        gn_near_find_hidden(frame, scratch, figures);
     for (int b = 0; b < r->n_blocks; b++) {
         if (r->wanted[b])
             sum_block(frame, scratch, b);
