@@ -296,7 +296,7 @@ bool gn_projection_get_direction(const struct gn_projection *projection, double 
         return true;
     }
     double dx = x - p->center[0], dy = y - p->center[1], r = hypot(dx, dy);
-    if (r > p->radius)
+    if (r > p->radius * (1 + 1e-12)) // what get_position gives of the rim lies on it
         return false;
     double theta = fmin(get_theta(p, r / p->focal), p->theta_max);
     double scale = r > 0 ? sin(theta) / r : 0;

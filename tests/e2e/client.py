@@ -446,7 +446,7 @@ def test_usage():
             (['probe', '--files', 'a', '--setup', 'b', '--projection', 'angular'], ['one of them']),
             (['probe', '--files', 'a', '--rate', '0'], ['--rate', '0.001']),
             (['probe', '--files', 'a', '--start-at', '1e12'], ['--start-at']),
-            (['probe', '--files', 'a', '--projection', 'cube'], ['latlong, angular']),
+            (['probe', '--files', 'a', '--projection', 'square'], ['latlong, angular']),
             (['view', '--files', 'a', '--out', 'o'], ['--camera FILE']),
             (['view', '--sequence', 'a', '--camera', 'c', '--out', 'o'], ['--camera FILE']),
             (['view', '--sequence', 'a'], ['--out']),
