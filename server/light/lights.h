@@ -33,6 +33,9 @@ void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *ma
 /** Adds n texels, in order: the same sums to the bit. */
 void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *map,
                          const uint32_t *texels, size_t n);
+/** Adds n texels from the first on. */
+void gn_patch_add_run(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t first,
+                      uint32_t n);
 /** Adds another patch. */
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other);
 /**

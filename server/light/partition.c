@@ -58,7 +58,8 @@ static int sort_samples(struct gn_partition *p)
             p->items[next[of[i]]++] = (struct gn_split_item){
                 {(float)polar[0], (float)polar[1]},
                 (float)(get_luminance(p, texel) / p->map->figures.max_luminance),
-                texel};
+                texel,
+                1};
         }
         for (int r = 0; pass == 0 && r < n_regions; r++)
             next[r + 1] += next[r];
@@ -139,10 +140,12 @@ static uint32_t find_brightest(const struct gn_partition *p, const struct gn_spl
                                int n)
 {
     uint32_t best = items[0].texel;
-    for (int i = 1; i < n; i++) {
-        double y = get_luminance(p, items[i].texel), y_best = get_luminance(p, best);
-        if (y > y_best || (y == y_best && items[i].texel < best))
-            best = items[i].texel;
+    for (int i = 0; i < n; i++) {
+        for (uint32_t t = items[i].texel; t < items[i].texel + items[i].n; t++) {
+            double y = get_luminance(p, t), y_best = get_luminance(p, best);
+            if (y > y_best || (y == y_best && t < best))
+                best = t;
+        }
     }
     return best;
 }
@@ -169,7 +172,7 @@ static void take_part(void *context, const struct gn_split_item *items, int n, u
         gn_patch_add_texel(&patch, p->map, find_brightest(p, items, n));
     } else {
         for (int i = 0; i < n; i++)
-            gn_patch_add_texel(&patch, p->map, items[i].texel);
+            gn_patch_add_run(&patch, p->map, items[i].texel, items[i].n);
     }
     p->is_lit[slot] = gn_patch_get_light(&patch, light);
     light->id = get_region_id(p, sink->region, path);
@@ -185,18 +188,32 @@ static void take_part(void *context, const struct gn_split_item *items, int n, u
 }
 
 /* Adds a base region's lit texels to the items; weights as shares of the energy, so that no scale
- * of light is too large. */
-static int list_texels(const struct gn_partition *p, int r, double energy,
+ * of light is too large. Of many texels those side by side are one item, while it holds less than
+ * an eighth of a part: cuts need no finer ones. */
+static int list_texels(const struct gn_partition *p, int r, const struct gn_region *whole,
                        struct gn_split_item *items)
 {
     const struct gn_partition_plan *plan = p->plan;
+    uint32_t n_joined = (plan->start[r + 1] - plan->start[r]) / 1024;
+    double most = whole->patch.energy / (8.0 * (double)whole->n_parts), sum = 0;
     int n = 0;
+    n_joined = n_joined < 1 ? 1 : n_joined > 16 ? 16 : n_joined;
     for (uint32_t i = plan->start[r]; i < plan->start[r + 1]; i++) {
         uint32_t texel = plan->texel[i];
-        double share = get_luminance(p, texel) * (double)p->map->solid_angle[texel] / energy;
-        const float *polar = plan->polar + 2 * (size_t)i;
-        if (share > 0)
-            items[n++] = (struct gn_split_item){{polar[0], polar[1]}, (float)share, texel};
+        double energy = get_luminance(p, texel) * (double)p->map->solid_angle[texel];
+        struct gn_split_item *last = items + n - 1;
+        if (!(energy > 0))
+            continue;
+        if (n > 0 && last->n < n_joined && last->texel + last->n == texel && sum + energy < most) {
+            sum += energy;
+            last->n++;
+        } else {
+            sum = energy;
+            last = items + n++;
+            *last = (struct gn_split_item){.texel = texel, .n = 1};
+        }
+        memcpy(last->polar, plan->polar + 2 * (size_t)(i - last->n / 2), sizeof(last->polar));
+        last->weight = (float)(sum / whole->patch.energy);
     }
     return n;
 }
@@ -206,7 +223,6 @@ static int list_items(const struct gn_partition *p, int r, struct gn_polar_box *
 {
     const struct gn_region *region = &p->regions[r];
     struct gn_split_item *items = p->items + region->first_item;
-    double energy = region->patch.energy;
     int n = 0, n_base = p->plan->n_regions;
     *out_box = (struct gn_polar_box){{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     for (int k = r < n_base ? r : 0; k < (r < n_base ? r + 1 : n_base); k++) {
@@ -219,7 +235,7 @@ static int list_items(const struct gn_partition *p, int r, struct gn_polar_box *
             out_box->low[c] = fmin(out_box->low[c], box.low[c]);
             out_box->high[c] = fmax(out_box->high[c], box.high[c]);
         }
-        n += list_texels(p, k, energy, items + n);
+        n += list_texels(p, k, region, items + n);
     }
     return n;
 }

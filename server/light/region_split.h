@@ -11,11 +11,12 @@
 
 #include "server/light/partition_plan.h"
 
-/** A texel or a sample. */
+/** Texels side by side, or a sample. */
 struct gn_split_item {
     float polar[2]; // theta, phi
     float weight;   // >= 0; only ratios matter
-    uint32_t texel;
+    uint32_t texel; // the first
+    uint32_t n;     // of consecutive ones; 1 for a sample
 };
 
 /** How to cut. */
