@@ -27,8 +27,8 @@ struct gn_cli_request {
     struct gn_options *options; // owned
     const char *scene, *env, *camera, *out;
     // May be NULL:
-    const char *env_params, *background, *report, *light_map, *irradiance_map, *shadow_png,
-        *composite_png;
+    const char *env_params, *more_envs, *background, *report, *light_map, *irradiance_map,
+        *shadow_png, *composite_png;
     bool has_projection;
     enum gn_projection_type projection;
     bool has_world_from_env;
@@ -51,11 +51,13 @@ void gn_cli_request_finish(struct gn_cli_request *request);
 
 /**
  * Reads the environment picture and makes the lighting state, without what is not needed. What is
- * written counts: a report needs the harmonics, a picture of the light its lights.
+ * written counts: a report needs the harmonics, a picture of the light its lights. In the scene's
+ * global model, light starts at its real objects: the scene is borrowed until the state is freed.
  */
 GN_MUST_USE int gn_cli_read_light(const struct gn_cli_request *request,
-                                  const struct gn_render_needs *needs, struct gn_pool *pool,
-                                  struct gn_lighting_state **out_state, struct gn_error *out_error);
+                                  const struct gn_scene *scene, const struct gn_render_needs *needs,
+                                  struct gn_pool *pool, struct gn_lighting_state **out_state,
+                                  struct gn_error *out_error);
 
 /** The light of the environment picture, where there is one, and of the scene's own emitters. */
 GN_MUST_USE int gn_cli_make_light(const struct gn_cli_request *request,

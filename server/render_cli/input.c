@@ -1,11 +1,13 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 #include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/device_json.h"
 #include "common/image_file.h"
 #include "common/json.h"
+#include "server/light/blend.h"
 #include "server/render_cli/cli.h"
 
 /** --env-params, with what the command line says besides. */
@@ -65,9 +67,10 @@ static int init_projection(const struct gn_cli_request *request, const struct gn
     return 0;
 }
 
-int gn_cli_read_light(const struct gn_cli_request *request, const struct gn_render_needs *needs,
-                      struct gn_pool *pool, struct gn_lighting_state **out_state,
-                      struct gn_error *out_error)
+/** Of one probe. */
+static int read_probe(const struct gn_cli_request *request, const struct gn_scene *scene,
+                      const struct gn_render_needs *needs, struct gn_pool *pool,
+                      struct gn_lighting_state **out_state, struct gn_error *out_error)
 {
     static const int code_max[] = {0, 255, 65535}; // of enum gn_image_kind
     struct gn_image_file file = {0};
@@ -107,12 +110,64 @@ int gn_cli_read_light(const struct gn_cli_request *request, const struct gn_rend
     struct gn_light_options light = request->light;
     light.no_sh = needs->why_no_sh && !request->report && !request->irradiance_map;
     light.no_lights = needs->why_no_lights && !request->light_map;
-    ret = gn_lighting_state_create(&frame, NULL, &light, pool, out_state, &reason);
+    const struct gn_radiance_map_options map = {.model =
+                                                    scene->model == GN_MODEL_GLOBAL ? scene : NULL};
+    ret = gn_lighting_state_create(&frame, &map, &light, pool, out_state, &reason);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", request->env, reason.text);
 out:
     gn_image_finish(&image);
     gn_image_file_finish(&file);
+    return ret;
+}
+
+/** The other probes of --more-envs, behind the n that are there; *list is written over. */
+static int read_more(const struct gn_cli_request *request, const struct gn_scene *scene,
+                     const struct gn_render_needs *needs, struct gn_pool *pool, char *list,
+                     struct gn_lighting_state **states, int *n, struct gn_error *out_error)
+{
+    char *rest = NULL;
+    for (char *item = strtok_r(list, ",", &rest); item; item = strtok_r(NULL, ",", &rest)) {
+        struct gn_cli_request other = *request;
+        char *params = strchr(item, '=');
+        if (!params || params == item || !params[1])
+            return gn_error_set(out_error, -EINVAL,
+                                "--more-envs: '%s' is not a picture and its parameters, ENV=PARAMS",
+                                item);
+        if (*n == GN_PROBES_MAX)
+            return gn_error_set(out_error, -EINVAL, "--more-envs: more than %d probes in all",
+                                GN_PROBES_MAX);
+        *params = '\0';
+        other.env = item;
+        other.env_params = params + 1;
+        other.has_world_from_env = false;
+        int ret = read_probe(&other, scene, needs, pool, &states[*n], out_error);
+        if (ret < 0)
+            return ret;
+        ++*n;
+    }
+    return 0;
+}
+
+int gn_cli_read_light(const struct gn_cli_request *request, const struct gn_scene *scene,
+                      const struct gn_render_needs *needs, struct gn_pool *pool,
+                      struct gn_lighting_state **out_state, struct gn_error *out_error)
+{
+    struct gn_lighting_state *states[GN_PROBES_MAX] = {0};
+    char *list = NULL;
+    int n = 1;
+    *out_state = NULL;
+    int ret = read_probe(request, scene, needs, pool, &states[0], out_error);
+    if (ret == 0 && request->more_envs) {
+        list = strdup(request->more_envs);
+        ret = list ? read_more(request, scene, needs, pool, list, states, &n, out_error)
+                   : gn_error_set(out_error, -ENOMEM, "--more-envs: out of memory");
+    }
+    if (ret == 0 && (ret = gn_lighting_state_join(states, n, 0, out_state)) < 0)
+        (void)gn_error_set(out_error, ret, "the probes' light: out of memory");
+    for (int i = 0; i < n; i++)
+        gn_lighting_state_unref(&states[i]);
+    free(list);
     return ret;
 }
 

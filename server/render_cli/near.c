@@ -55,7 +55,7 @@ int gn_cli_make_light(const struct gn_cli_request *request, const struct gn_scen
         goto out;
     emission = gn_emitters_get_emission(emitters);
     if (request->env)
-        ret = gn_cli_read_light(request, needs, pool, &state, out_error);
+        ret = gn_cli_read_light(request, scene, needs, pool, &state, out_error);
     else if (emission)
         ret = gn_lighting_state_create_dark(emission, &request->light, 0, &state, out_error);
     else

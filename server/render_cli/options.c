@@ -33,6 +33,10 @@ static const struct gn_option table[] = {
              "theta_max in radians, k [k1, k2, k3, k4], vignetting [a, b, c], pixel_format, "
              "response, to_rec709, scale, "
              "orientation [w, x, y, z] (world_from_probe), position [x, y, z] in metres."},
+    {.key = "more-envs",
+     .value_name = "ENV=PARAMS,...",
+     .help = "Up to 7 pictures of other probes, each with its own parameters, which hold its "
+             "position: light is interpolated between all of them."},
     {.key = "world-from-env",
      .value_name = "R00,...,R22",
      .help = "Rotation from the picture's axes to the world's: 9 numbers, row-major; without it: "
@@ -286,6 +290,7 @@ static void read_paths(struct gn_cli_request *request)
     if (is_set(request, "emitter-pieces"))
         request->n_emitter_pieces = get_int(request, "emitter-pieces");
     request->env_params = get_path(request, "env-params");
+    request->more_envs = get_path(request, "more-envs");
     request->camera = get_path(request, "camera");
     request->background = get_path(request, "background");
     request->out = get_path(request, "out");

@@ -211,6 +211,47 @@ def test_params_describe_the_picture():
               env='fisheye.png', env_params='params.json')
 
 
+def test_several_probes():
+    # White at x = -1 m, half of that at 1 m; the box's top in the middle gets the mean.
+    write('half.hdr', make_hdr(32, 16, bytes((128, 128, 128, 128))))
+    for name, x in (('left', -1), ('right', 1)):
+        write(name + '.json', json.dumps({'projection': 'latlong', 'position': [x, 0, .2]}))
+    middle, values = 24 * 64 + 32, []
+    for more in ((), ('--more-envs', 'half.hdr=right.json')):
+        check_run('--quality', 'reference', *more, env_params='left.json')
+        values.append(read_exr('out.exr')[0]['virtual.R'][middle])
+    check(near(values[1], .75 * values[0], .01 * values[0]), values)
+    for bad in ('half.hdr', '=x', 'half.hdr=', 'none.hdr=right.json',
+                ','.join(['half.hdr=right.json'] * 8)):
+        done = run('--more-envs', bad, env_params='left.json')
+        check(done.returncode != 0 and done.stderr.count(b'\n') == 1, bad)
+
+
+def test_global_model():
+    # A mirror that looks down at the floor from above the probe: it shows what the probe measured
+    # there, black, and not the lit floor of the local model.
+    write('mirror.json', json.dumps({'projection': 'latlong', 'position': [0, 0, .1]}))
+    black = bytes((0, 0, 0, 0))
+    write('sky.hdr', b'#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n' +
+          bytes((128, 128, 128, 129)) * (32 * 8) + black * (32 * 8))
+    up = dict(CAMERA, world_from_camera=[1, 0, 0, 0, 0, 0, 1, -.6, 0, -1, 0, .1, 0, 0, 0, 1])
+    write('side.json', json.dumps(up))
+    mirror = {'mesh': 'box.obj', 'role': 'virtual', 'material': {'type': 'mirror'},
+              'world_from_object': [1, 0, 0, 0, 0, .8, -.6, .3, 0, .6, .8, .1, 0, 0, 0, 1]}
+    values = {}
+    for model in ('local', 'global'):
+        write('m.json', json.dumps({'objects': [SCENE['objects'][0], mirror], 'model': model}))
+        check_run(scene='m.json', env='sky.hdr', env_params='mirror.json', camera='side.json')
+        channels = read_exr('out.exr')[0]
+        values[model] = [v for v, a in zip(channels['virtual.R'], channels['virtual.A']) if a == 1]
+    check(max(values['local']) > .1, 'no mirror in view')
+    darker = sum(g < .5 * l for l, g in zip(values['local'], values['global']))
+    check(darker > 20, '%d of %d pixels' % (darker, len(values['local'])))
+    write('m.json', json.dumps(dict(SCENE, model='half')))
+    done = run(scene='m.json')
+    check(done.returncode != 0 and b'model' in done.stderr, done.stderr)
+
+
 def test_help():
     done = run('--help', scene=None, env=None, camera=None, out=None)
     check(done.returncode == 0 and b'Examples:' in done.stdout and b'--light-method' in done.stdout, 'help')
