@@ -29,6 +29,23 @@ def test_composite_and_receipt():
         assert result.capture_time_ns > 0
 
 
+def test_lamp_in_the_scene():
+    """A room that no probe lights: a lamp of scene.json throws the cube's shadow to the other side."""
+    scene = SCENE[:-1] + ', "lights": [{"type": "point", "position": [0.6, 0, 0.6],' \
+        ' "intensity": [3, 3, 3]}]}'
+    with Daemon(rooms=Room(scene=scene)) as daemon, Viewer(daemon, 64, 48) as viewer:
+        result, payload = viewer.expect_result(viewer.send_frame(lighting_wait_ms=60000))
+        row = [payload[3 * (24 * 64 + x)] for x in range(64)]
+        left = [x for x in range(32) if row[x] == 0]
+        print('# row through the cube: %s' % row)
+        assert len(left) >= 3, 'no shadow to the left of the cube'
+        assert all(code == 128 for code in row[44:]), 'a shadow towards the lamp'
+        assert result.receipt.lights_used == 1
+        assert result.receipt.lighting_sequence == 0
+    with Daemon() as daemon, Viewer(daemon) as viewer:
+        viewer.expect_dropped(viewer.send_frame(), pb.DROP_REASON_NO_LIGHTING)
+
+
 def test_each_id_once():
     """Frames faster than they can be rendered, from three viewers: every id comes back once."""
     with Daemon() as daemon, probe(daemon) as light:
@@ -288,7 +305,8 @@ def test_shutdown():
         assert time.monotonic() - start < 15
 
 
-run_tests([test_composite_and_receipt, test_each_id_once, test_one_outstanding_loses_nothing,
+run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_each_id_once,
+           test_one_outstanding_loses_nothing,
            test_slow_reader, test_told_at_once, test_waiting_for_light, test_reasons,
            test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,
            test_shutdown])
