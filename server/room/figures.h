@@ -80,6 +80,9 @@ struct gn_probe_figures {
     uint64_t sequence; // of its last frame that gave light
     uint64_t n_lit;    // such frames
     int64_t capture_ns;
+    int n_clipped;      // texels of that frame at the sensor's rail: brighter than it could say
+    int n_mended;       // with a channel that was no light: NaN, infinite, negative
+    int n_out_of_gamut; // with a channel that the colour matrix made negative
     double rate_hz; // such frames per second, by the median of the last intervals; 0: not known yet
 };
 

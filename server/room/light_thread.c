@@ -329,6 +329,28 @@ static void count_state_locked(struct gn_room *room, const struct gn_lighting_st
     f->light_holds += state->in_time.verdict == GN_TEMPORAL_HOLD;
 }
 
+/** Says once of each probe that its sensor could not see how bright something is: the sun, or a
+ * lamp, is darker in its map than in the room. */
+static void warn_of_clipping(struct gn_room *room, uint64_t probe_id,
+                             const struct gn_lighting_state *state)
+{
+    int n = state->map->figures.n_clipped;
+    if (n == 0)
+        return;
+    gn_mutex_lock(&room->mu);
+    struct gn_room_session *s = gn_room_find_locked(room, probe_id);
+    bool is_first = s && !s->was_clipped;
+    if (s)
+        s->was_clipped = true;
+    gn_mutex_unlock(&room->mu);
+    if (is_first)
+        gn_log(GN_LOG_WARN,
+               "room %s: session %llu: environment frame %llu has %d clipped pixels, at the "
+               "sensor's largest code: what is brighter is lost; a shorter exposure or a filter "
+               "keeps it",
+               room->name, (unsigned long long)probe_id, (unsigned long long)state->sequence, n);
+}
+
 /** Makes the state its probe's light; takes the reference. */
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
                     double ms_decode, bool is_same)
@@ -344,6 +366,7 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
     take_subscribers_locked(room, false, &subscribers);
     gn_mutex_unlock(&room->mu);
     unref_all(old, n_old);
+    warn_of_clipping(room, probe_id, mine);
     join_lights(room);
     if (subscribers.n > 0)
         tell_subscribers(room, mine, &subscribers);

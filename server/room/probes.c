@@ -167,12 +167,16 @@ int gn_probes_get_figures(const struct gn_probes *probes,
         if (!p->light)
             continue;
         struct gn_probe_figures *f = &out_figures[n++];
+        const struct gn_radiance_map_figures *m = &p->light->map->figures;
         double interval_ms = gn_time_window_get(&p->interval, 0.5);
         *f = (struct gn_probe_figures){.session_id = p->session_id,
                                        .has_left = p->has_left,
                                        .n_lights = p->light->n_lights,
                                        .sequence = p->light->sequence,
                                        .n_lit = p->n_lit,
+                                       .n_clipped = m->n_clipped,
+                                       .n_mended = m->n_nan + m->n_inf + m->n_negative,
+                                       .n_out_of_gamut = m->n_out_of_gamut,
                                        .capture_ns = p->light->capture_time_ns,
                                        .rate_hz = interval_ms > 0 ? 1000 / interval_ms : 0};
         memcpy(f->position, p->light->map->world_from_probe.translation, sizeof(f->position));

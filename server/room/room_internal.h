@@ -36,7 +36,8 @@ struct gn_room_session {
     struct gn_pose world_from_camera;
     uint64_t last_frame_id, last_environment_sequence, last_emitter_sequence;
 
-    bool was_told; // guarded by room->mu: it was sent a lighting state, or is about to be
+    bool was_clipped; // guarded by room->mu: a frame of it was, and the log says so
+    bool was_told;    // guarded by room->mu: it was sent a lighting state, or is about to be
     struct gn_session_figures figures; // guarded by room->mu
 };
 

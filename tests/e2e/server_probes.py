@@ -143,4 +143,21 @@ def test_fair():
         quick.close()
 
 
-run_tests([test_blend_and_leave, test_bounded, test_fair])
+def test_clipped_rails_are_said_once():
+    """A saturated sun: in the status each time, in the log once."""
+    dark = struct.pack('<H', 1000) * (32 * 16)
+    sun = dark[:600] + struct.pack('<H', 4095) * 5 + dark[610:]
+    response = pb.Response(type=pb.RESPONSE_TYPE_LOG, log_a=.6, log_b=.08, log_c=.01)
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Viewer(daemon) as viewer, \
+            probe(daemon) as lamp:
+        for sequence, pixels, clipped in ((1, dark, 0), (2, sun, 5), (3, sun, 5), (4, dark, 0)):
+            light_up(lamp, sequence, pixels=pixels, pixel_format=pb.PIXEL_FORMAT_MONO12,
+                     response=response)
+            viewer.expect_result(viewer.send_frame(lighting_min_sequence=sequence,
+                                                   lighting_wait_ms=60000))
+            lit_by, = read_room(daemon)['lit_by']
+            assert lit_by['clipped_texels'] == clipped and lit_by['mended_texels'] == 0, lit_by
+        assert daemon.read_log().count('5 clipped pixels') == 1, daemon.read_log()
+
+
+run_tests([test_clipped_rails_are_said_once, test_blend_and_leave, test_bounded, test_fair])
