@@ -23,7 +23,7 @@ int main(void)
         for (int k = 0; k < GN_PENROSE_INDICES; k++)
             printf("{%.4ff, %.4ff}%s", (double)row[k][0], (double)row[k][1],
                    k == GN_PENROSE_INDICES - 1 ? "},\n"
-                   : k % 5 == 4                ? ",\n     "
+                   : k % 4 == 3                ? ",\n     "
                                                : ", ");
     }
     puts("};");
