@@ -155,7 +155,7 @@ static struct gn_mesh make_fan(int n)
 static void test_thousands_of_triangles(void **state)
 {
     (void)state;
-    enum { N = 9000 };
+    enum { N = 3000 };
     struct gn_test_stage stage = {0};
     const double eye[3] = {2, -3, 0.5}, target[3] = {0, 0, 0};
     gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_plane(20, 2), 0, 0, 0, GN_MATERIAL_DIFFUSE,
@@ -164,7 +164,7 @@ static void test_thousands_of_triangles(void **state)
     stage.objects[1].emission[0] = 5;
     gn_test_stage_commit(&stage, 0);
     double area = N * 2 / 3 * 0.5 * sin(2 * M_PI / N);
-    for (int n = 1; n <= 4096; n *= 16) {
+    for (int n = 1; n <= 1024; n *= 32) {
         const struct gn_emitter_options options = {.n_pieces = n};
         struct gn_emitters *emitters = NULL;
         assert_int_equal(gn_emitters_create(stage.scene, &options, &emitters, NULL), 0);
