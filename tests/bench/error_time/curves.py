@@ -56,13 +56,23 @@ def find(points, error):
 
 
 class Curves:
-    def __init__(self, rows, base):
-        self.rows = [r for r in rows if r["lights"] > 0 and r["rmse"] > 0]
+    def __init__(self, rows, reference, base):
+        self.all = rows
+        self.nearest = {(r["scene"], r["map"]): 10 * r["self_error"] for r in reference}
+        self.rows = [r for r in rows if r["lights"] > 0 and r["rmse"] > 0
+                     and r["rmse"] >= self.nearest[r["scene"], r["map"]]]
         self.base = base
         self.maps = list(dict.fromkeys(r["map"] for r in rows))
         self.pairs = list(dict.fromkeys((r["scene"], r["map"]) for r in rows))
         self.methods = [m for m in dict.fromkeys(r["method"] for r in rows)
                         if m not in tables.BASELINE]
+
+    def count_all(self, scene, map_name):
+        return sum(r["scene"] == scene and r["map"] == map_name for r in self.all)
+
+    def count_too_near(self, scene, map_name):
+        return sum(r["scene"] == scene and r["map"] == map_name
+                   and r["rmse"] < self.nearest[scene, map_name] for r in self.all)
 
     def select(self, method, scene, map_name):
         names = tables.BASELINE if method == self.base else (method,)
@@ -85,7 +95,12 @@ class Curves:
                 if r["lights"] in kept and r["rmse"] < best.get(r["lights"], {"rmse": 9})["rmse"]:
                     best[r["lights"]] = r
             rows = list(best.values())
-        return sorted((r["lights"], r["ms_light"] + r["ms_frame"], r["rmse"]) for r in rows)
+        points = sorted((r["lights"], r["ms_light"] + r["ms_frame"], r["rmse"]) for r in rows)
+        if method == self.base:  # more lights and more time do not help it: the plateau
+            most = self.select(method, scene, map_name)
+            points.append((max(r["lights"] for r in most),
+                           max(r["ms_light"] + r["ms_frame"] for r in most), points[-1][2]))
+        return points
 
     def mean_error_at_time(self, method, ms):
         """Geometric mean over all pairs; None unless it has a setting for each."""
@@ -110,15 +125,24 @@ class Curves:
         return None if None in needed else geometric_mean(needed)
 
     def same_lights_ratios(self, method, base, map_name, n):
-        """Error of the base's best setting of at most n lights over the method's best of no more."""
+        """The base's error at n lights over the method's."""
+        pairs = [p for p in self.pairs if p[1] == map_name]
+        found = [(look_up(self.by_lights(base, p), n), look_up(self.by_lights(method, p), n))
+                 for p in pairs]
+        return [b / m for b, m in found if b and m]
+
+    def literal_row(self, params, scene, map_name):
+        return next(r for r in self.select("seed", scene, map_name) if r["params"] == params)
+
+    def literal_ratios(self, method, params, map_name):
+        """Error of that setting of the literal partition over the method's at as many lights."""
         ratios = []
-        for pair in self.pairs:
-            if pair[1] != map_name:
-                continue
-            settings = [r for r in self.select(base, *pair) if r["lights"] <= n]
-            mine = [r for r in self.select(method, *pair) if r["lights"] <= n]
-            if settings and mine:
-                ratios.append(min(r["rmse"] for r in settings) / min(r["rmse"] for r in mine))
+        for scene, its_map in self.pairs:
+            if its_map == map_name:
+                row = self.literal_row(params, scene, map_name)
+                mine = look_up(self.by_lights(method, (scene, map_name)), row["lights"])
+                if mine:
+                    ratios.append(row["rmse"] / mine)
         return ratios
 
     def near(self, method, pair, n):

@@ -19,10 +19,10 @@ const struct gn_bench_map_kind gn_bench_maps[] = {
     {"sun", 4},
     {"overcast", 2},
     {"rig", 4}, // no files
-    {"interior", 2},
-    {"city", 2},
-    {"sunrise", 2}, // GN_TEST_MAPS
-    {"drachenfels_cellar_1k", 2},
+    {"interior", 4},
+    {"city", 4},
+    {"sunrise", 4}, // GN_TEST_MAPS
+    {"drachenfels_cellar_1k", 4},
     {"lebombo_1k", 2}, // GNOMON_DATA
 };
 const int gn_bench_n_maps = GN_ARRAY_LEN(gn_bench_maps);

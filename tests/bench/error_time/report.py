@@ -9,6 +9,7 @@ tree's docs folder) the page goes to DOCS/error.md and the SVG plots beside it. 
 """
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,10 +17,11 @@ import sys
 import tables
 from curves import Curves, geometric_mean
 
-BUDGETS_MS = [4, 8, 16, 32, 64, 128]
+BUDGETS_MS = [16, 24, 32, 48, 64, 128]
 LEVELS = [0.05, 0.02, 0.01]
 PLOT_MAPS = ["lamps", "sun", "overcast", "rig"]
 BASE = "the paper's partition"
+LITERAL = "8x24 maxLS=8 2^k mean of samples"
 
 
 def table(head, rows):
@@ -93,7 +95,7 @@ def lights_table(curves):
 
 
 def same_lights_table(curves):
-    """At no more lights than the literal partition's best setting of at most N has."""
+    """At 64 and at 256 lights."""
     rows = []
     for method in curves.methods:
         cells = []
@@ -105,6 +107,21 @@ def same_lights_table(curves):
             cells.append(" / ".join(parts))
         rows.append([method] + cells)
     return table(["method"] + curves.maps, rows)
+
+
+def literal_table(curves):
+    """Against the paper's own numbers where it gives them, at no more lights."""
+    rows = []
+    for method in curves.methods:
+        cells = []
+        for map_name in curves.maps:
+            ratios = curves.literal_ratios(method, LITERAL, map_name)
+            cells.append(ratio(geometric_mean(ratios)) if ratios else "-")
+        rows.append([method] + cells)
+    lights = ["its lights"]
+    for map_name in curves.maps:
+        lights.append(f"{curves.literal_row(LITERAL, 'ball', map_name)['lights']:.0f}")
+    return table(["method"] + curves.maps, [lights] + rows)
 
 
 def irradiance_tables(curves, harmonics):
@@ -140,11 +157,31 @@ def stream_table(stream):
     return table(["method", "lights", "filter s", "flicker F", "noise, codes", "frames to 90 %"], rows)
 
 
-def reference_table(reference):
-    return table(["map", "scene", "reference within", "smallest error", "ratio"],
-                 [[r["map"], r["scene"], f"{r['self_error']:.1e}", f"{r['smallest']:.1e}",
-                   f"{r['smallest'] / r['self_error']:.0f}" if r["self_error"] else "-"]
-                  for r in reference])
+def reference_table(curves, reference):
+    rows = []
+    for r in reference:
+        rows.append([r["map"], r["scene"], f"{r['self_error']:.1e}",
+                     f"{curves.count_too_near(r['scene'], r['map'])} of "
+                     f"{curves.count_all(r['scene'], r['map'])}"])
+    return table(["map", "scene", "reference within", "settings too near to judge"], rows)
+
+
+def get_default(curves):
+    """What the daemon takes, and whether the front says so."""
+    here = os.path.dirname(os.path.abspath(__file__))
+    with open(os.path.join(here, "../../../deploy/gnomond.conf.example"), encoding="utf-8") as f:
+        text = f.read()
+    method = re.search(r"^#light-method = (\S+)$", text, re.M)[1]
+    n = int(re.search(r"^#lights = (\d+)$", text, re.M)[1])
+    row = curves.mean_row(method, n)
+    ms = row["ms_light"] + row["ms_frame"]
+    ranked = sorted((error, m) for m in curves.methods
+                    if (error := curves.mean_error_at_time(m, ms)) is not None)
+    if method != ranked[0][1]:
+        print(f"report: the default is {method}; the front says {ranked[0][1]}", file=sys.stderr)
+    others = ", ".join(f"{m} {number(error)}" for error, m in ranked)
+    return (f"The daemon's default is **{method}** with {n} lights. In the {ms:.0f} ms that it takes here, the "
+            f"methods' mean RMSE, least first: {others}.")
 
 
 def get_machine():
@@ -158,6 +195,8 @@ def get_machine():
 
 
 def get_commit():
+    if os.environ.get("GN_COMMIT"):  # what was measured, where the tree has moved on since
+        return os.environ["GN_COMMIT"]
     here = os.path.dirname(os.path.abspath(__file__))
     done = subprocess.run(["git", "-C", here, "log", "-1", "--format=%h of %cs"],
                           capture_output=True, text=True)
@@ -186,11 +225,11 @@ def plot_panel(out, curves, map_name, axis, title, is_last, floor):
         width, kind = (3, 7) if method == BASE else (1.3, i % 13 + 1)
         color = "black" if method == BASE else COLORS[i % len(COLORS)]
         parts.append(f"'{path}' using 1:2 with linespoints lw {width} pt {kind} ps 0.5 "
-                     f"lc rgb '{color}' title '{method}'")
+                     f"lc rgb '{color}' title \"{method}\"")
     x0 = 30 if axis else 16
     parts.append(f"{floor}*({x0}/x)**0.5 ls 100 title 'slope -1/2'")
     parts.append(f"{floor}*({x0}/x) ls 100 dt 3 title 'slope -1'")
-    key = "set key outside right center font ',9' samplen 2" if is_last else "set key off"
+    key = "set key at screen 0.995, screen 0.7 right font ',9' samplen 2" if is_last else "set key off"
     return f"set title '{title}'\n{key}\nplot {', '.join(parts)}\n"
 
 
@@ -214,7 +253,8 @@ def draw_all(folder, curves, stream):
     maps = [m for m in PLOT_MAPS if m in curves.maps]
     for name, axis, label in (("error-time", 1, "ms, frame to lights and picture"),
                               ("error-lights", 0, "lights")):
-        body = (f"set multiplot layout 2,2\nset xlabel '{label}'\nset ylabel 'RMSE of the shadow'\n"
+        body = ("set multiplot layout 2,2 margins 0.08,0.80,0.08,0.95 spacing 0.09,0.13\n"
+                f"set xlabel '{label}'\nset ylabel 'RMSE of the shadow' offset 1.5\n"
                 "set xrange [*:*]\nset yrange [0.001:0.3]\n")
         for i, map_name in enumerate(maps):
             body += plot_panel(data, curves, map_name, axis, f"{map_name}, ball",
@@ -244,13 +284,14 @@ def make_page(folder, curves):
         page = f.read()
     fields = {
         "machine": get_machine(), "commit": get_commit(), "compiler": run["compiler"],
+        "load": f"{run['load']:.0f}",
         "size": f"{run['width']:.0f} x {run['height']:.0f}", "repeats": f"{run['repeats']:.0f}",
         "maps": ", ".join(curves.maps), "n_pairs": f"{len(curves.pairs)}",
-        "front": front_table(curves), "equal_time": equal_time_table(curves),
+        "default": get_default(curves), "front": front_table(curves), "equal_time": equal_time_table(curves),
         "equal_error": equal_error_table(curves), "lights": lights_table(curves),
-        "same_lights": same_lights_table(curves), "still": still_table(curves, 64),
+        "same_lights": same_lights_table(curves), "literal": literal_table(curves), "still": still_table(curves, 64),
         "irradiance": irradiance_tables(curves, harmonics), "stream": stream_table(stream),
-        "reference": reference_table(tables.read(folder, "reference.csv")),
+        "reference": reference_table(curves, tables.read(folder, "reference.csv")),
     }
     for key, value in fields.items():
         page = page.replace(f"@{key}@", "\n".join(value) if isinstance(value, list) else value)
@@ -261,7 +302,7 @@ def main():
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
     folder = sys.argv[1]
-    curves = Curves(tables.read(folder, "error.csv"), BASE)
+    curves = Curves(tables.read(folder, "error.csv"), tables.read(folder, "reference.csv"), BASE)
     page = make_page(folder, curves)
     with open(os.path.join(folder, "page.md"), "w", encoding="utf-8") as f:
         f.write(page)

@@ -14,8 +14,8 @@ static const struct variant {
     enum gn_light_weights weights;
     bool relaxed;
 } variants[] = {
-    {GN_LIGHT_PENROSE, "+w3", GN_WEIGHTS_PARTITION, false},
-    {GN_LIGHT_PENROSE, "+w3 relaxed", GN_WEIGHTS_PARTITION, true},
+    {GN_LIGHT_PENROSE, " equal", GN_WEIGHTS_EQUAL, false},
+    {GN_LIGHT_PENROSE, " relaxed", GN_WEIGHTS_PARTITION, true},
 };
 
 struct list {
