@@ -272,7 +272,9 @@ static void get_sphere_position(const struct gn_projection *p, const double dir[
         double st[2];
         int face = gn_cube_map_from_direction(dir, st);
         out_xy[0] = 0.5 * (1 + st[0]) * p->width;
-        out_xy[1] = (face + 0.5 * (1 - st[1])) * p->width;
+        // A face's lower edge is the upper edge of the next square, which looks elsewhere.
+        double end = nextafter((face + 1.0) * p->width, 0);
+        out_xy[1] = fmin((face + 0.5 * (1 - st[1])) * p->width, end);
     } else if (p->type == GN_PROJECTION_OCTAHEDRAL) {
         double uv[2];
         gn_octahedral_from_direction(dir, uv);

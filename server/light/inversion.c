@@ -200,8 +200,10 @@ static int make_lights(struct points *p, int n, struct gn_light_list *list)
     if (rc < 0)
         return rc;
     add_energies(p);
-    if (!(p->rows[p->grid->side] > 0))
+    if (!(p->rows[p->grid->side] > 0)) {
+        p->n = 0;
         return 0;
+    }
     place_points(p);
     rc = share_out(p);
     for (int i = 0; i < p->n && rc == 0; i++) {
@@ -222,7 +224,7 @@ int gn_inversion_make_lights(const struct gn_light_input *input, struct gn_light
     int rc = gn_grid_init(&grid, input);
     if (rc == 0)
         rc = make_lights(&points, input->settings->n_aim, list);
-    figures->n_samples = input->settings->n_aim;
+    figures->n_samples = points.n;
     finish(&points);
     gn_grid_finish(&grid);
     return rc;

@@ -320,20 +320,40 @@ static void test_names(void **state)
     assert_null(gn_projection_get_name(GN_PROJECTION_COUNT));
 }
 
+/* A direction on the edge of two faces is on the edge of its own square, not the next one's. */
+static void test_cube_edges(void **state)
+{
+    (void)state;
+    for (int side = 1; side <= 1024; side = 3 * side + 1) {
+        struct gn_projection p = {
+            .type = GN_PROJECTION_CUBE, .width = side, .height = 6 * side, .theta_max = 0};
+        assert_int_equal(gn_projection_init(&p, NULL), 0);
+        for (int i = 0; i < 27; i++) {
+            double dir[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}, at[2], middle[3], dot = 0;
+            double length = sqrt(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
+            if (!(length > 0))
+                continue;
+            assert_true(gn_projection_get_position(&p, dir, at));
+            int x = (int)fmin(at[0], p.width - 1), y = (int)fmin(at[1], p.height - 1);
+            assert_true(gn_projection_get_direction(&p, x + 0.5, y + 0.5, middle));
+            for (int c = 0; c < 3; c++)
+                dot += dir[c] / length * middle[c];
+            if (!(dot > cos(1.5 / side))) // a little over half of a texel's diagonal
+                fail_msg("side %d: (%g, %g, %g) is in texel %d %d", side, dir[0], dir[1], dir[2], x,
+                         y);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_radial_axes),
-        cmocka_unit_test(test_mirrorball_axes),
-        cmocka_unit_test(test_latlong_axes),
-        cmocka_unit_test(test_cube_axes),
-        cmocka_unit_test(test_octahedral_axes),
-        cmocka_unit_test(test_steps),
-        cmocka_unit_test(test_radius_of_models),
-        cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_outside),
-        cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_radial_axes),     cmocka_unit_test(test_mirrorball_axes),
+        cmocka_unit_test(test_latlong_axes),    cmocka_unit_test(test_cube_axes),
+        cmocka_unit_test(test_octahedral_axes), cmocka_unit_test(test_cube_edges),
+        cmocka_unit_test(test_steps),           cmocka_unit_test(test_radius_of_models),
+        cmocka_unit_test(test_round_trip),      cmocka_unit_test(test_outside),
+        cmocka_unit_test(test_refusals),        cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
