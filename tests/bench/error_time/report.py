@@ -166,7 +166,7 @@ def reference_table(curves, reference):
     return table(["map", "scene", "reference within", "settings too near to judge"], rows)
 
 
-def get_default(curves):
+def get_default(curves, stream):
     """What the daemon takes, and whether the front says so."""
     here = os.path.dirname(os.path.abspath(__file__))
     with open(os.path.join(here, "../../../deploy/gnomond.conf.example"), encoding="utf-8") as f:
@@ -177,11 +177,16 @@ def get_default(curves):
     ms = row["ms_light"] + row["ms_frame"]
     ranked = sorted((error, m) for m in curves.methods
                     if (error := curves.mean_error_at_time(m, ms)) is not None)
-    if method != ranked[0][1]:
-        print(f"report: the default is {method}; the front says {ranked[0][1]}", file=sys.stderr)
-    others = ", ".join(f"{m} {number(error)}" for error, m in ranked)
-    return (f"The daemon's default is **{method}** with {n} lights. In the {ms:.0f} ms that it takes here, the "
-            f"methods' mean RMSE, least first: {others}.")
+    flicker = {r["method"]: r["flicker"] for r in stream if r["smoothing"] > 0}
+    bound = 2 * min(flicker.values())
+    steady = [m for _, m in ranked if flicker[m] <= bound]
+    if method != steady[0]:
+        print(f"report: the default is {method}; the front says {steady[0]}", file=sys.stderr)
+    others = ", ".join(f"{m} {number(error)} ({number(flicker[m])})" for error, m in ranked)
+    return (f"In the {ms:.0f} ms that {method} with {n} lights takes here, the methods' mean RMSE, and in\n"
+            f"parentheses their flicker with the daemon's filter (below): {others}.\n"
+            f"A daemon shows streams: of the methods that flicker at most twice as much as the steadiest, the\n"
+            f"least error has **{steady[0]}**. The daemon's default is **{method}** with {n} lights.")
 
 
 def get_machine():
@@ -287,7 +292,7 @@ def make_page(folder, curves):
         "load": f"{run['load']:.0f}",
         "size": f"{run['width']:.0f} x {run['height']:.0f}", "repeats": f"{run['repeats']:.0f}",
         "maps": ", ".join(curves.maps), "n_pairs": f"{len(curves.pairs)}",
-        "default": get_default(curves), "front": front_table(curves), "equal_time": equal_time_table(curves),
+        "default": get_default(curves, stream), "front": front_table(curves), "equal_time": equal_time_table(curves),
         "equal_error": equal_error_table(curves), "lights": lights_table(curves),
         "same_lights": same_lights_table(curves), "literal": literal_table(curves), "still": still_table(curves, 64),
         "irradiance": irradiance_tables(curves, harmonics), "stream": stream_table(stream),
