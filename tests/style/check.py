@@ -172,6 +172,33 @@ def check_suites(root, paths):
                     yield f"{path}: test({call.split(',')[0]}, ...) is in none of our suites"
 
 
+def check_traps(root, paths):
+    """docs/numerics.md: each row names a test that is there, or what is not built; no trap's test
+    is left out."""
+    doc = "docs/numerics.md"
+    text = read(root, doc)
+    named = set()
+    for n, line in enumerate(text.split("\n"), 1):
+        found = re.findall(r"\b(unit|numeric|truth|e2e)/(\w+)((?:,? `\w+`)+)", line)
+        if re.match(r"\| (?!case|#|---)", line) and not found and "not built" not in line:
+            yield f"{doc}:{n}: names no test: {line[:60]}"
+        for folder, name, tests in found:
+            path = next((q for q in (f"tests/{folder}/{name}.c", f"tests/{folder}/{name}.py")
+                         if q in paths), None)
+            for test in re.findall(r"`(\w+)`", tests):
+                named.add(test)
+                if not path or not re.search(rf"\b{test}\b", read(root, path)):
+                    yield f"{doc}:{n}: {folder}/{name} has no test {test}"
+    for path in paths:
+        if path.startswith("tests/") and path.endswith(".c"):
+            for test in re.findall(r"cmocka_unit_test\w*\((trap_\w+)", read(root, path)):
+                if test not in named:
+                    yield f"{doc}: says nothing of {test} in {path}"
+    for row in range(1, 30):
+        if not re.search(rf"^\| {row} \|", text, re.M):
+            yield f"{doc}: has no row {row}"
+
+
 CHECKS = [("includes keep the layers", check_layers),
           ("every source file has its SPDX lines", check_spdx),
           ("nothing is marked unfinished", check_unfinished),
@@ -182,7 +209,8 @@ CHECKS = [("includes keep the layers", check_layers),
           ("each source file includes its own header first", check_own_header),
           ("what the documents name is there", check_links),
           ("no path of one machine", check_machine),
-          ("every test is in a suite", check_suites)]
+          ("every test is in a suite", check_suites),
+          ("the numerical cases name their tests", check_traps)]
 
 
 def main():
