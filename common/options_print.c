@@ -9,6 +9,7 @@
 #include "common/options_internal.h"
 
 #define COLUMNS 80
+#define FLAG_INDENT 2
 #define HELP_INDENT 6
 
 /*
@@ -36,7 +37,9 @@ static void print_wrapped(FILE *out, const char *first, const char *indent, cons
     fputc('\n', out);
 }
 
-static const char *get_value_name(const struct gn_option *option)
+/* What stands for the value behind a flag of that length; choices where they fit in the line: the
+ * text below names them in any case. */
+static const char *get_value_name(const struct gn_option *option, size_t flag_length)
 {
     if (option->value_name != NULL)
         return option->value_name;
@@ -47,7 +50,9 @@ static const char *get_value_name(const struct gn_option *option)
     case GN_OPTION_DOUBLE:
         return "N";
     case GN_OPTION_ENUM:
-        return option->choices;
+        return FLAG_INDENT + 2 + flag_length + 1 + strlen(option->choices) <= COLUMNS
+                   ? option->choices
+                   : "NAME";
     case GN_OPTION_SET:
         return "NAMES";
     case GN_OPTION_BYTES:
@@ -93,7 +98,7 @@ void gn_options_print_help(const struct gn_program *program, FILE *out)
         const struct gn_option *option = &program->options[i];
         gn_option_get_flag(option, "NAME", sizeof(flag), flag);
         if (option->type != GN_OPTION_BOOL)
-            fprintf(out, "  --%s %s\n", flag, get_value_name(option));
+            fprintf(out, "  --%s %s\n", flag, get_value_name(option, strlen(flag)));
         else if (gn_section_is_named(option->section))
             fprintf(out, "  --%s\n", flag);
         else

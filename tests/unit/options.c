@@ -469,6 +469,33 @@ static void test_help(void **unused)
     free(text);
 }
 
+/* Choices stand behind the flag while they fit in the line; the sentence has them always. */
+static void test_help_with_long_choices(void **unused)
+{
+    (void)unused;
+#define CHOICES "aaaaaaaaa|bbbbbbbbb|ccccccccc|ddddddddd|eeeeeeeeee|ffffffffffffffffffff"
+    static const struct gn_option modes[] = {
+        {.key = "mode", .type = GN_OPTION_ENUM, .choices = CHOICES, .help = "M."},
+        {.key = "mode2", .type = GN_OPTION_ENUM, .choices = CHOICES, .help = "M."}};
+    static const struct gn_program small = {
+        .name = "p", .usage = "", .summary = "S.", .options = modes, .n_options = 2};
+    char *text = NULL;
+    size_t size = 0;
+    FILE *file = open_memstream(&text, &size);
+    gn_options_print_help(&small, file);
+    fclose(file);
+    for (const char *line = text; *line != '\0'; line += strcspn(line, "\n") + 1)
+        assert_true(strcspn(line, "\n") <= 80);
+    const char *first = strstr(text, "  --mode " CHOICES "\n");
+    assert_non_null(first);
+    assert_int_equal(strcspn(first, "\n"), 80);
+    const char *second = strstr(text, "  --mode2 NAME\n      M. One of aaaaaaaaa,");
+    assert_non_null(second);
+    assert_non_null(strstr(second, "eeeeeeeeee"));
+    free(text);
+#undef CHOICES
+}
+
 /* The example is read back, as it is and with every comment sign before a key taken away. */
 static void test_example(void **unused)
 {
@@ -525,6 +552,7 @@ int main(void)
         cmocka_unit_test(test_secret),
         cmocka_unit_test(test_visit),
         cmocka_unit_test(test_help),
+        cmocka_unit_test(test_help_with_long_choices),
         cmocka_unit_test(test_example),
         cmocka_unit_test(test_addresses),
     };
