@@ -16,6 +16,27 @@ int gn_rig_room_add(struct gn_rig_room *room, struct gn_rig_object *object)
     return 0;
 }
 
+/* Takes the object's triangles as emitters. */
+static int add_emitters(struct gn_rig_emitters *emitters, const struct gn_rig_object *o)
+{
+    struct gn_rig_emitter e = {.is_virtual = o->role == GN_RT_VIRTUAL};
+    const double *m = o->world_from_object;
+    int result = 0;
+    memcpy(e.emission, o->emission, sizeof(e.emission));
+    if (!(e.emission[0] + e.emission[1] + e.emission[2] > 0))
+        return 0;
+    for (int t = 0; result == 0 && t < o->mesh.n_triangles; t++) {
+        for (int i = 0; i < 3; i++) {
+            const float *p = o->mesh.positions + 3 * (size_t)o->mesh.triangles[3 * t + i];
+            for (int k = 0; k < 3; k++)
+                e.corners[i][k] =
+                    m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3];
+        }
+        result = gn_rig_emitters_add(emitters, &e);
+    }
+    return result;
+}
+
 int gn_rig_room_commit(struct gn_rig_room *room, struct gn_pool *pool, struct gn_error *out_error)
 {
     int result = gn_rt_create(&room->rt, out_error);
@@ -23,6 +44,8 @@ int gn_rig_room_commit(struct gn_rig_room *room, struct gn_pool *pool, struct gn
         const struct gn_rig_object *o = &room->objects[i];
         result = gn_rt_add_mesh(room->rt, o->role, (uint32_t)i, &o->mesh, o->world_from_object,
                                 out_error);
+        if (result == 0 && add_emitters(&room->emitters, o) != 0)
+            result = gn_error_set(out_error, -ENOMEM, "rig: no memory for the emitters");
     }
     return result ? result : gn_rt_commit(room->rt, pool, out_error);
 }
@@ -32,6 +55,7 @@ void gn_rig_room_finish(struct gn_rig_room *room)
     for (int i = 0; i < room->n_objects; i++)
         gn_mesh_finish(&room->objects[i].mesh);
     gn_rt_destroy(&room->rt);
+    gn_rig_emitters_finish(&room->emitters);
     memset(room, 0, sizeof(*room));
 }
 
@@ -77,6 +101,8 @@ void gn_rig_room_get_surface(const struct gn_rig_room *room, const double dir[st
     gn_rig_finish_get_albedo(object->finish, s.point, s.albedo);
     if (vec_dot(s.normal_geometric, dir) > 0)
         vec_scale(s.normal_geometric, -1, s.normal_geometric);
+    else
+        memcpy(s.emission, object->emission, sizeof(s.emission));
     memcpy(s.normal_shading, s.normal_geometric, sizeof(s.normal_shading));
     if (object->mesh.normals) {
         get_shading_normal(object, hit, s.normal_shading);

@@ -13,6 +13,7 @@
 #include "common/pool.h"
 #include "server/scene/mesh.h"
 #include "server/scene/rt.h"
+#include "tests/rig/emitters.h"
 
 #define GN_RIG_MAX_OBJECTS 16
 /** Triangles of the demo room, teapot included. */
@@ -33,6 +34,7 @@ struct gn_rig_object {
     enum gn_rt_set role;
     enum gn_rig_finish finish;
     double albedo[3];    // unless the mesh has albedos
+    double emission[3];  // W/(sr m^2), sent from its outside; diffuse objects only
     struct gn_mesh mesh; // owned
     double world_from_object[16];
 };
@@ -41,7 +43,10 @@ struct gn_rig_object {
 struct gn_rig_room {
     int n_objects;
     struct gn_rig_object objects[GN_RIG_MAX_OBJECTS];
-    struct gn_rt *rt; // owned
+    int n_lamps;
+    struct gn_rig_lamp lamps[GN_RIG_MAX_LAMPS];
+    struct gn_rig_emitters emitters; // of the objects, from commit on; owned
+    struct gn_rt *rt;                // owned
 };
 
 /** A point on a surface, as the rig shades it. */
@@ -51,6 +56,7 @@ struct gn_rig_surface {
     double normal_geometric[3]; // turned to where the ray came from
     double normal_shading[3];   // interpolated, turned to the same side
     double albedo[3];
+    double emission[3]; // to where the ray came from
     bool is_mirror;
     bool is_virtual;
 };

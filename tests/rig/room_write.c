@@ -10,6 +10,11 @@
 #include "common/file.h"
 #include "tests/rig/room.h"
 
+static bool is_emitter(const struct gn_rig_object *o)
+{
+    return o->emission[0] > 0 || o->emission[1] > 0 || o->emission[2] > 0;
+}
+
 static bool is_same_colour(const float *a, const float *b)
 {
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
@@ -69,6 +74,28 @@ static int write_text(const char *directory, const char *name, const char *suffi
     return result;
 }
 
+static json_t *describe_material(const struct gn_rig_object *o)
+{
+    json_t *material = json_object();
+    json_object_set_new(material, "type",
+                        json_string(o->finish == GN_RIG_MIRROR ? "mirror" : "diffuse"));
+    if (!o->mesh.albedos)
+        json_object_set_new(material, "albedo",
+                            json_pack("[fff]", o->albedo[0], o->albedo[1], o->albedo[2]));
+    if (is_emitter(o))
+        json_object_set_new(material, "emission",
+                            json_pack("[fff]", o->emission[0], o->emission[1], o->emission[2]));
+    return material;
+}
+
+static json_t *describe_lamp(const struct gn_rig_lamp *lamp)
+{
+    const double *p = lamp->position, *i = lamp->intensity;
+    return json_pack("{s:s,s:[fff],s:[fff],s:f,s:s}", "type", "point", "position", p[0], p[1], p[2],
+                     "intensity", i[0], i[1], i[2], "radius", lamp->radius, "role",
+                     lamp->is_virtual ? "virtual" : "real");
+}
+
 static json_t *describe_object(const struct gn_rig_object *object)
 {
     json_t *matrix = json_array(), *o = json_object();
@@ -77,12 +104,8 @@ static json_t *describe_object(const struct gn_rig_object *object)
     json_object_set_new(o, "name", json_string(object->name));
     json_object_set_new(o, "mesh", json_sprintf("%s.obj", object->name));
     json_object_set_new(o, "role", json_string(object->role == GN_RT_REAL ? "real" : "virtual"));
-    if (!object->mesh.albedos)
-        json_object_set_new(o, "material",
-                            json_pack("{s:s,s:[fff]}", "type",
-                                      object->finish == GN_RIG_MIRROR ? "mirror" : "diffuse",
-                                      "albedo", object->albedo[0], object->albedo[1],
-                                      object->albedo[2]));
+    if (!object->mesh.albedos || is_emitter(object))
+        json_object_set_new(o, "material", describe_material(object));
     json_object_set_new(o, "world_from_object", matrix);
     return o;
 }
@@ -90,7 +113,7 @@ static json_t *describe_object(const struct gn_rig_object *object)
 int gn_rig_room_write(const struct gn_rig_room *room, const char *directory,
                       struct gn_error *out_error)
 {
-    json_t *list = json_array(), *scene = json_object();
+    json_t *list = json_array(), *lamps = json_array(), *scene = json_object();
     char path[4096];
     int result = 0;
     json_object_set_new(scene, "objects", list);
@@ -101,6 +124,11 @@ int gn_rig_room_write(const struct gn_rig_room *room, const char *directory,
         if (result == 0 && o->mesh.albedos)
             result = write_text(directory, o->name, "mtl", print_mtl, &o->mesh, out_error);
     }
+    for (int i = 0; i < room->n_lamps; i++)
+        json_array_append_new(lamps, describe_lamp(&room->lamps[i]));
+    if (room->n_lamps > 0)
+        json_object_set(scene, "lights", lamps);
+    json_decref(lamps);
     char *text = json_dumps(scene, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     snprintf(path, sizeof(path), "%s/scene.json", directory);
     if (result == 0)

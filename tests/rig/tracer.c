@@ -11,8 +11,14 @@
 
 /* Bounces and mirrors together. */
 #define MAX_VERTICES (GN_RIG_MAX_BOUNCES + 4)
-/* Pairs of random numbers: one for the pixel, two for each vertex. */
-#define MAX_PAIRS (1 + 2 * MAX_VERTICES)
+/* Pairs of random numbers: one for the pixel, two for each vertex; then, where there is near light,
+ * one for the emitters and one for each lamp at each vertex. */
+#define NEAR_PAIRS (1 + 2 * MAX_VERTICES)
+#define MAX_PAIRS (NEAR_PAIRS + (1 + GN_RIG_MAX_LAMPS) * MAX_VERTICES)
+
+/* Rays to near light end this share of their length before it: they start a little off the surface,
+ * so that they would run into an emitter seen edge-on. */
+#define NEAR_GAP 1e-3
 
 struct job {
     const struct gn_rig_room *room;
@@ -88,6 +94,46 @@ static void gather_light(const struct job *job, enum gn_rt_set set, const struct
     }
     for (int k = 0; k < 3; k++)
         out_sent[k] = light.radiance[k] * cosine / (GN_RIG_PI * light.pdf_solid_angle);
+}
+
+/* Adds one near light, for an albedo of 1. A virtual one is part of the light with the virtual
+ * objects only. */
+static void add_near(const struct job *job, enum gn_rt_set set, const struct gn_rig_surface *s,
+                     const struct gn_rig_near_sample *light, double io_sent[static 3],
+                     bool *io_meets)
+{
+    float org[3], dir[3];
+    double cosine = vec_dot(light->dir, s->normal_shading);
+    if (cosine <= 0 || vec_dot(light->dir, s->normal_geometric) <= 0)
+        return;
+    leave_surface(s, light->dir, org, dir);
+    float length = (float)(light->distance * (1 - NEAR_GAP));
+    bool is_hidden = gn_rt_is_occluded(job->room->rt, set, org, dir, 0, length);
+    if (set == GN_RT_ALL && !*io_meets)
+        *io_meets = light->is_virtual || (is_hidden && !gn_rt_is_occluded(job->room->rt, GN_RT_REAL,
+                                                                          org, dir, 0, length));
+    for (int k = 0; k < 3 && !is_hidden && (set == GN_RT_ALL || !light->is_virtual); k++)
+        io_sent[k] += light->given[k] * cosine / GN_RIG_PI;
+}
+
+/* The same from lamps and emissive objects, added: one point of each lamp, one of all objects. */
+static void gather_near(const struct job *job, enum gn_rt_set set, const struct gn_rig_surface *s,
+                        struct draws *draws, int vertex, double io_sent[static 3], bool *io_meets)
+{
+    const struct gn_rig_room *room = job->room;
+    int pair = NEAR_PAIRS + (1 + GN_RIG_MAX_LAMPS) * vertex;
+    struct gn_rig_near_sample light;
+    double uv[2];
+    if (room->emitters.n > 0) {
+        get_pair(draws, pair, uv);
+        if (gn_rig_emitters_sample(&room->emitters, s->point, uv, &light))
+            add_near(job, set, s, &light, io_sent, io_meets);
+    }
+    for (int i = 0; i < room->n_lamps; i++) {
+        get_pair(draws, pair + 1 + i, uv);
+        if (gn_rig_lamp_sample(&room->lamps[i], s->point, uv, &light))
+            add_near(job, set, s, &light, io_sent, io_meets);
+    }
 }
 
 /* A direction around the unit normal n with density cos / pi: Malley's method on the frame of
@@ -169,11 +215,16 @@ static void trace_path(const struct job *job, enum gn_rt_set set, struct draws *
         }
         path.sees_virtual |= vertex == 0 && s.is_virtual;
         path.meets_virtual |= s.is_virtual;
+        for (int k = 0; k < 3 && !is_gathered; k++) {
+            path.all[k] += weight[k] * s.emission[k];
+            path.direct[k] += diffuse == 0 ? weight[k] * s.emission[k] : 0;
+        }
         if (diffuse > job->options.bounces)
             break; // the last ray only looked for light
         if (!s.is_mirror) {
             get_pair(draws, 1 + 2 * vertex, uv);
             gather_light(job, set, &s, uv, rgb, &path.meets_virtual);
+            gather_near(job, set, &s, draws, vertex, rgb, &path.meets_virtual);
             for (int k = 0; k < 3; k++) {
                 double sent = weight[k] * s.albedo[k] * rgb[k];
                 path.all[k] += sent;
