@@ -35,9 +35,24 @@ static bool is_same_reading(const struct gn_environment_job *a, const struct gn_
     return a->session_id == b->session_id && memcmp(&x, &y, sizeof(x)) == 0;
 }
 
+/* The response's table lies in the payload, before the pixels. */
+static size_t get_table_bytes(const struct gn_environment_job *job)
+{
+    const struct gn_msg_response *r = &job->frame.response;
+    return r->type == GN_MSG_RESPONSE_TYPE_TABLE ? 4 * (size_t)r->table_entries : 0;
+}
+
+/* Of two jobs with the same reading. */
+static bool is_same_table(const struct gn_environment_job *a, const struct gn_environment_job *b)
+{
+    size_t n = get_table_bytes(a);
+    return n == 0 || (a->payload && b->payload && n <= a->payload->len && n <= b->payload->len &&
+                      memcmp(a->payload->data, b->payload->data, n) == 0);
+}
+
 void gn_worked_frame_keep(struct gn_worked_frame *worked, const struct gn_environment_job *job)
 {
-    bool keeps_bounds = is_same_reading(&worked->job, job);
+    bool keeps_bounds = is_same_reading(&worked->job, job) && is_same_table(&worked->job, job);
     gn_buf_unref(&worked->job.payload);
     if (!keeps_bounds) {
         free(worked->bounds);
@@ -171,11 +186,9 @@ bool gn_worked_frame_is_same(struct gn_worked_frame *worked, const struct gn_env
         return false;
     if (old == now || memcmp(old->data, now->data, now->len) == 0)
         return true;
-    size_t n_table = job->frame.response.type == GN_MSG_RESPONSE_TYPE_TABLE
-                         ? 4 * (size_t)job->frame.response.table_entries
-                         : 0;
-    if (!(noise > 0) || n_table > now->len || memcmp(old->data, now->data, n_table) != 0)
+    if (!(noise > 0) || !is_same_table(&worked->job, job))
         return false;
+    size_t n_table = get_table_bytes(job);
     const uint8_t *a = old->data + n_table, *b = now->data + n_table;
     size_t n_bytes = now->len - n_table;
     if (job->frame.pixel_format == GN_MSG_PIXEL_FORMAT_RGB_F32)

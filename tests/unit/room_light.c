@@ -419,6 +419,37 @@ static void knows_how_far_a_code_may_be_off(void **test)
     gn_buf_unref(&now.payload);
 }
 
+static void put_table(struct gn_environment_job *job, float a, float b, float c, unsigned code)
+{
+    const float table[3] = {a, b, c};
+    memcpy(job->payload->data, table, sizeof(table));
+    put_code(job, code);
+}
+
+/* The table lies in the payload: a header that stays says nothing of it. */
+static void forgets_the_bounds_of_another_table(void **test)
+{
+    (void)test;
+    size_t n = sizeof(float[3]) + (size_t)MAP_WIDTH * MAP_HEIGHT * 6;
+    struct gn_worked_frame worked = {0};
+    struct gn_environment_job old = make_job(GN_MSG_PIXEL_FORMAT_RGB12, n);
+    struct gn_environment_job now = make_job(GN_MSG_PIXEL_FORMAT_RGB12, n);
+    old.frame.response = now.frame.response =
+        (struct gn_msg_response){.type = GN_MSG_RESPONSE_TYPE_TABLE, .table_entries = 3};
+    put_table(&old, 1, 1, 2, 100); // all codes up to the middle mean the same
+    put_table(&now, 1, 1, 2, 1800);
+    gn_worked_frame_keep(&worked, &old);
+    assert_true(gn_worked_frame_is_same(&worked, &now, 0.004));
+    put_table(&now, 0, 0.5f, 1, 100);
+    assert_false(gn_worked_frame_is_same(&worked, &now, 0.004));
+    gn_worked_frame_keep(&worked, &now);
+    put_table(&old, 0, 0.5f, 1, 1800);
+    assert_false(gn_worked_frame_is_same(&worked, &old, 0.004));
+    gn_worked_frame_finish(&worked);
+    gn_buf_unref(&old.payload);
+    gn_buf_unref(&now.payload);
+}
+
 static void compares_floats_by_share(void **test)
 {
     (void)test;
@@ -448,6 +479,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(knows_how_far_a_code_may_be_off),
+        cmocka_unit_test(forgets_the_bounds_of_another_table),
         cmocka_unit_test(compares_floats_by_share),
         cmocka_unit_test(leaves_equal_frames_alone),
         cmocka_unit_test(makes_harmonics_only_for_who_uses_them),
