@@ -34,9 +34,8 @@ struct work {
     struct wants wants;
     bool is_short; // a probe's light lacks some of that
     bool has_job;
-    struct gn_environment_job job;      // where has_job
-    struct gn_lighting_state *previous; // a reference: the last state of the job's probe, or NULL
-    bool is_stale;                      // the probes' lights are to be joined anew
+    struct gn_probe_work probe; // where has_job
+    bool is_stale;              // the probes' lights are to be joined anew
     bool has_picture;
     struct gn_emitter_job picture; // where has_picture
     struct subscribers newcomers;  // who has not been sent the states that are there
@@ -113,8 +112,7 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
         int newest;
         if (out->newcomers.n > 0)
             out->n_lights = gn_probes_get_lights(&room->probes, out->lights, &newest);
-        out->has_job =
-            gn_probes_take(&room->probes, is_light_wanted_locked(room), &out->job, &out->previous);
+        out->has_job = gn_probes_take(&room->probes, is_light_wanted_locked(room), &out->probe);
         out->has_picture =
             gn_screens_take(&room->screens, is_light_wanted_locked(room), &out->picture);
         out->is_stale = room->is_light_stale;
@@ -351,26 +349,46 @@ static void warn_of_clipping(struct gn_room *room, uint64_t probe_id,
                room->name, (unsigned long long)probe_id, (unsigned long long)state->sequence, n);
 }
 
-/** Makes the state its probe's light; takes the reference. */
+/** Makes the state, of the worked frame or NULL, its probe's light; takes both. */
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
-                    double ms_decode, bool is_same)
+                    struct gn_worked_frame *worked, double ms_decode, bool is_same)
 {
     struct subscribers subscribers;
-    struct gn_lighting_state *mine = gn_lighting_state_ref(state), *old[GN_PROBES_MAX];
+    struct gn_lighting_state *mine = gn_lighting_state_ref(state);
+    struct gn_probe old[GN_PROBES_MAX];
     int n_old;
     gn_mutex_lock(&room->mu);
-    gn_probes_set_light(&room->probes, probe_id, state, gn_clock_get_monotonic_ns(), old, &n_old);
-    room->figures.light_ms_decode = ms_decode;
-    room->has_failed_to_complete = false;
-    count_state_locked(room, mine, is_same);
-    take_subscribers_locked(room, false, &subscribers);
+    bool is_there = gn_probes_set_light(&room->probes, probe_id, state, worked,
+                                        gn_clock_get_monotonic_ns(), old, &n_old);
+    if (is_there) {
+        room->figures.light_ms_decode = ms_decode;
+        room->has_failed_to_complete = false;
+        count_state_locked(room, mine, is_same);
+        take_subscribers_locked(room, false, &subscribers);
+    }
     gn_mutex_unlock(&room->mu);
-    unref_all(old, n_old);
-    warn_of_clipping(room, probe_id, mine);
-    join_lights(room);
-    if (subscribers.n > 0)
-        tell_subscribers(room, mine, &subscribers);
+    for (int i = 0; i < n_old; i++)
+        gn_probe_finish(&old[i]);
+    if (is_there) {
+        warn_of_clipping(room, probe_id, mine);
+        join_lights(room);
+        if (subscribers.n > 0)
+            tell_subscribers(room, mine, &subscribers);
+    }
     gn_lighting_state_unref(&mine);
+}
+
+/** The probe's frame gave no light. Takes the worked frame, or NULL. */
+static void refuse_environment(struct gn_room *room, const struct gn_environment_job *job,
+                               struct gn_worked_frame *worked, int code, const char *sentence)
+{
+    struct gn_probe old;
+    gn_mutex_lock(&room->mu);
+    gn_probes_refuse(&room->probes, job->session_id, worked, &old);
+    gn_cond_signal(&room->render_wake); // nobody waits for its light any more
+    gn_mutex_unlock(&room->mu);
+    gn_probe_finish(&old);
+    refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, code, sentence);
 }
 
 static struct gn_light_options get_light_options(const struct gn_room *room, struct wants wants)
@@ -411,71 +429,61 @@ static void complete_lights(struct gn_room *room, struct wants wants)
     join_lights(room);
 }
 
-/** What the thread keeps from frame to frame. */
-struct lighter {
-    struct gn_environment_decoder *decoder; // NULL: no memory
-    struct gn_worked_frame worked[GN_PROBES_MAX];
-    int next; // of them, to be given up
-};
-
-/** The probe's last frame that was worked on, or the place for it. */
-static struct gn_worked_frame *get_worked(struct lighter *lighter, uint64_t session_id)
+/** The frame is what its probe's next ones are compared with; where there is no memory they are all
+ * worked on. */
+static void keep_worked(struct gn_worked_frame **worked, const struct gn_environment_job *job)
 {
-    for (int i = 0; i < GN_PROBES_MAX; i++) {
-        if (lighter->worked[i].job.session_id == session_id)
-            return &lighter->worked[i];
-    }
-    struct gn_worked_frame *worked = &lighter->worked[lighter->next];
-    lighter->next = (lighter->next + 1) % GN_PROBES_MAX;
-    gn_worked_frame_finish(worked);
-    return worked;
+    if (!*worked)
+        *worked = calloc(1, sizeof(**worked));
+    if (*worked)
+        gn_worked_frame_keep(*worked, job);
 }
 
-/** From one frame to its probe's light. previous: its last state, whose tables are used again. */
-static void make_light(struct gn_room *room, struct lighter *lighter,
-                       struct gn_environment_job *job, struct wants wants,
-                       const struct gn_lighting_state *previous)
+/** From one frame to its probe's light; takes the work. decoder: NULL where there is no memory. */
+static void make_light(struct gn_room *room, struct gn_environment_decoder *decoder,
+                       struct gn_probe_work *work, struct wants wants)
 {
     struct gn_error error = {0};
     struct gn_environment_frame frame;
     struct gn_lighting_state *state = NULL;
     struct gn_light_options options = get_light_options(room, wants);
-    struct gn_worked_frame *worked = get_worked(lighter, job->session_id);
+    struct gn_environment_job *job = &work->job;
+    const struct gn_lighting_state *previous = work->light; // its tables are used again
     int64_t start_ns = gn_clock_get_monotonic_ns();
     double ms_decode = 0;
     int rc = 0;
     options.previous = previous;
     options.stream = job->session_id;
-    bool is_same = previous && previous->stream == job->session_id && !lacks(previous, wants) &&
-                   gn_worked_frame_is_same(worked, job, room->options.environment_noise);
+    bool is_same = work->worked && previous && previous->stream == job->session_id &&
+                   !lacks(previous, wants) &&
+                   gn_worked_frame_is_same(work->worked, job, room->options.environment_noise);
     if (is_same) {
         rc = gn_lighting_state_advance(previous, job->frame.sequence, job->frame.capture_time_ns,
                                        &options, &state);
         if (rc < 0)
             (void)gn_error_set(&error, rc, "out of memory");
     } else {
-        rc = lighter->decoder ? gn_environment_decode(lighter->decoder, &job->frame, job->payload,
-                                                      &frame, &error)
-                              : gn_error_set(&error, -ENOMEM, "out of memory");
+        rc = decoder ? gn_environment_decode(decoder, &job->frame, job->payload, &frame, &error)
+                     : gn_error_set(&error, -ENOMEM, "out of memory");
         ms_decode = gn_clock_get_ms_between(start_ns, gn_clock_get_monotonic_ns());
         if (rc == 0)
             rc = gn_lighting_state_create(&frame, &room->options.map, &options, room->options.pool,
                                           &state, &error);
         if (rc == 0)
-            gn_worked_frame_keep(worked, job);
+            keep_worked(&work->worked, job);
     }
     if (rc < 0)
-        refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, rc,
-               error.text);
+        refuse_environment(room, job, work->worked, rc, error.text);
     else
-        publish(room, job->session_id, state, ms_decode, is_same);
+        publish(room, job->session_id, state, work->worked, ms_decode, is_same);
     gn_buf_unref(&job->payload);
+    gn_lighting_state_unref(&work->light);
 }
 
 void gn_room_run_light(void *context)
 {
     struct gn_room *room = context;
-    struct lighter lighter = {.decoder = calloc(1, sizeof(*lighter.decoder))};
+    struct gn_environment_decoder *decoder = calloc(1, sizeof(*decoder));
     struct gn_screen_decoder screen_decoder = {0};
     struct work work;
     while (wait_for_work(room, &work)) {
@@ -489,13 +497,10 @@ void gn_room_run_light(void *context)
         if (work.has_picture)
             show_picture(room, &screen_decoder, &work.picture);
         if (work.has_job)
-            make_light(room, &lighter, &work.job, work.wants, work.previous);
-        gn_lighting_state_unref(&work.previous);
+            make_light(room, decoder, &work.probe, work.wants);
     }
     gn_screen_decoder_finish(&screen_decoder);
-    for (int i = 0; i < GN_PROBES_MAX; i++)
-        gn_worked_frame_finish(&lighter.worked[i]);
-    if (lighter.decoder)
-        gn_environment_decoder_finish(lighter.decoder);
-    free(lighter.decoder);
+    if (decoder)
+        gn_environment_decoder_finish(decoder);
+    free(decoder);
 }

@@ -3,18 +3,27 @@
 #include "server/room/probes.h"
 
 #include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/room/same_frame.h"
+
+void gn_probe_finish(struct gn_probe *probe)
+{
+    if (probe->has_frame)
+        gn_buf_unref(&probe->job.payload);
+    gn_lighting_state_unref(&probe->light);
+    if (probe->worked)
+        gn_worked_frame_finish(probe->worked);
+    free(probe->worked);
+    memset(probe, 0, sizeof(*probe));
+}
 
 void gn_probes_finish(struct gn_probes *probes)
 {
-    for (int i = 0; i < GN_PROBES_MAX; i++) {
-        struct gn_probe *p = &probes->slots[i];
-        if (p->has_frame)
-            gn_buf_unref(&p->job.payload);
-        gn_lighting_state_unref(&p->light);
-    }
+    for (int i = 0; i < GN_PROBES_MAX; i++)
+        gn_probe_finish(&probes->slots[i]);
     memset(probes, 0, sizeof(*probes));
 }
 
@@ -26,30 +35,43 @@ static struct gn_probe *find(struct gn_probes *probes, uint64_t session_id)
     return NULL;
 }
 
-int gn_probes_put(struct gn_probes *probes, const struct gn_environment_job *job,
-                  struct gn_environment_job *out_superseded)
+/* A slot for one more probe: a free one, that of one that has left, that of one that was of no use.
+ */
+static struct gn_probe *find_room(struct gn_probes *probes)
 {
-    memset(out_superseded, 0, sizeof(*out_superseded));
-    struct gn_probe *p = find(probes, job->session_id);
-    for (int i = 0; i < GN_PROBES_MAX && !p; i++) {
-        struct gn_probe *slot = &probes->slots[i];
-        if (slot->session_id == 0 || (slot->has_left && !slot->light && !slot->has_frame))
-            p = slot;
+    struct gn_probe *useless = NULL;
+    for (int i = 0; i < GN_PROBES_MAX; i++) {
+        struct gn_probe *p = &probes->slots[i];
+        if (p->session_id == 0 || (p->has_left && !p->light && !p->has_frame))
+            return p;
+        if (p->was_refused && !p->is_at_work)
+            useless = p;
     }
-    if (!p)
-        return -EUSERS;
-    if (p->session_id != job->session_id)
-        *p = (struct gn_probe){.session_id = job->session_id};
-    bool had_frame = p->has_frame;
-    if (had_frame)
-        *out_superseded = p->job;
-    p->job = *job;
-    p->has_frame = true;
-    return had_frame;
+    return useless;
 }
 
-bool gn_probes_take(struct gn_probes *probes, bool all, struct gn_environment_job *out_job,
-                    struct gn_lighting_state **out_light)
+int gn_probes_put(struct gn_probes *probes, const struct gn_environment_job *job, bool is_new,
+                  struct gn_probe *out_old)
+{
+    memset(out_old, 0, sizeof(*out_old));
+    struct gn_probe *p = find(probes, job->session_id);
+    if (p) {
+        out_old->has_frame = p->has_frame;
+        out_old->job = p->job;
+    } else {
+        p = find_room(probes);
+        if (!p)
+            return -EUSERS;
+        *out_old = *p;
+        *p = (struct gn_probe){.session_id = job->session_id,
+                               .began = is_new ? ++probes->n_begun : 0};
+    }
+    p->job = *job;
+    p->has_frame = true;
+    return out_old->has_frame;
+}
+
+bool gn_probes_take(struct gn_probes *probes, bool all, struct gn_probe_work *out_work)
 {
     struct gn_probe *next = NULL, *left = NULL;
     for (int i = 0; i < GN_PROBES_MAX; i++) {
@@ -61,10 +83,15 @@ bool gn_probes_take(struct gn_probes *probes, bool all, struct gn_environment_jo
     }
     if (!next)
         return false;
-    *out_job = next->job;
     const struct gn_probe *last = next->light || !left ? next : left;
-    *out_light = last->light ? gn_lighting_state_ref(last->light) : NULL;
+    *out_work = (struct gn_probe_work){
+        .job = next->job,
+        .light = last->light ? gn_lighting_state_ref(last->light) : NULL,
+        .worked = next->worked,
+    };
+    next->worked = NULL;
     next->has_frame = false;
+    next->is_at_work = true;
     next->turn = ++probes->turn;
     return true;
 }
@@ -77,37 +104,56 @@ bool gn_probes_has_frame(const struct gn_probes *probes)
     return false;
 }
 
-/* Frees the slot; its light is the caller's. */
-static struct gn_lighting_state *clear(struct gn_probe *probe)
+/* Frees the slot. */
+static void move_out(struct gn_probe *probe, struct gn_probe *out)
 {
-    struct gn_lighting_state *light = probe->light;
-    if (probe->has_frame)
-        gn_buf_unref(&probe->job.payload);
+    *out = *probe;
     memset(probe, 0, sizeof(*probe));
-    return light;
 }
 
-void gn_probes_set_light(struct gn_probes *probes, uint64_t session_id,
-                         struct gn_lighting_state *light, int64_t now_ns,
-                         struct gn_lighting_state *out_old[static GN_PROBES_MAX], int *out_n)
+bool gn_probes_set_light(struct gn_probes *probes, uint64_t session_id,
+                         struct gn_lighting_state *light, struct gn_worked_frame *worked,
+                         int64_t now_ns, struct gn_probe out_old[static GN_PROBES_MAX], int *out_n)
 {
     struct gn_probe *p = find(probes, session_id);
-    *out_n = 0;
-    if (!p) { // it left meanwhile, and others have lit the room
-        out_old[(*out_n)++] = light;
-        return;
+    struct gn_probe *last = &out_old[0];
+    *last = (struct gn_probe){0};
+    *out_n = 1;
+    if (!p) {
+        last->light = light;
+        last->worked = worked;
+        return false;
     }
-    if (p->light) {
-        out_old[(*out_n)++] = p->light;
+    last->light = p->light;
+    *(p->has_left ? &last->worked : &p->worked) = worked;
+    if (p->light)
         gn_time_window_add(&p->interval, gn_clock_get_ms_between(p->lit_ns, now_ns));
-    }
     p->light = light;
     p->lit_ns = now_ns;
     p->n_lit++;
+    p->is_at_work = p->was_refused = false;
+    if (p->began == 0)
+        p->began = ++probes->n_begun;
     for (int i = 0; i < GN_PROBES_MAX; i++) {
         struct gn_probe *other = &probes->slots[i];
         if (other != p && other->has_left)
-            out_old[(*out_n)++] = clear(other);
+            move_out(other, &out_old[(*out_n)++]);
+    }
+    return true;
+}
+
+void gn_probes_refuse(struct gn_probes *probes, uint64_t session_id, struct gn_worked_frame *worked,
+                      struct gn_probe *out_old)
+{
+    struct gn_probe *p = find(probes, session_id);
+    *out_old = (struct gn_probe){0};
+    *(!p || p->has_left ? &out_old->worked : &p->worked) = worked;
+    if (!p)
+        return;
+    p->is_at_work = false;
+    if (!p->light) {
+        p->was_refused = true;
+        p->began = 0;
     }
 }
 
@@ -126,16 +172,33 @@ struct gn_lighting_state *gn_probes_replace_light(struct gn_probes *probes,
     return light;
 }
 
-struct gn_lighting_state *gn_probes_leave(struct gn_probes *probes, uint64_t session_id)
+void gn_probes_leave(struct gn_probes *probes, uint64_t session_id, struct gn_probe *out_old)
 {
     struct gn_probe *p = find(probes, session_id);
     bool has_others = false;
+    *out_old = (struct gn_probe){0};
     if (!p)
-        return NULL;
+        return;
     for (int i = 0; i < GN_PROBES_MAX; i++)
         has_others = has_others || (&probes->slots[i] != p && probes->slots[i].light);
     p->has_left = true;
-    return has_others ? clear(p) : NULL;
+    if (has_others) {
+        move_out(p, out_old);
+    } else {
+        out_old->worked = p->worked;
+        p->worked = NULL;
+    }
+}
+
+uint64_t gn_probes_get_newest(const struct gn_probes *probes)
+{
+    const struct gn_probe *newest = NULL;
+    for (int i = 0; i < GN_PROBES_MAX; i++) {
+        const struct gn_probe *p = &probes->slots[i];
+        if (p->began > 0 && (p->light || !p->has_left) && (!newest || p->began > newest->began))
+            newest = p;
+    }
+    return newest ? newest->session_id : 0;
 }
 
 int gn_probes_get_lights(const struct gn_probes *probes,
@@ -159,16 +222,17 @@ int gn_probes_get_lights(const struct gn_probes *probes,
 }
 
 int gn_probes_get_figures(const struct gn_probes *probes,
-                          struct gn_probe_figures out_figures[static GN_PROBES_MAX])
+                          struct gn_probe_figures out_figures[static GN_PROBES_MAX],
+                          struct gn_time_window out_intervals[static GN_PROBES_MAX])
 {
     int n = 0;
     for (int i = 0; i < GN_PROBES_MAX; i++) {
         const struct gn_probe *p = &probes->slots[i];
         if (!p->light)
             continue;
+        out_intervals[n] = p->interval;
         struct gn_probe_figures *f = &out_figures[n++];
         const struct gn_radiance_map_figures *m = &p->light->map->figures;
-        double interval_ms = gn_time_window_get(&p->interval, 0.5);
         *f = (struct gn_probe_figures){.session_id = p->session_id,
                                        .has_left = p->has_left,
                                        .n_lights = p->light->n_lights,
@@ -177,8 +241,7 @@ int gn_probes_get_figures(const struct gn_probes *probes,
                                        .n_clipped = m->n_clipped,
                                        .n_mended = m->n_nan + m->n_inf + m->n_negative,
                                        .n_out_of_gamut = m->n_out_of_gamut,
-                                       .capture_ns = p->light->capture_time_ns,
-                                       .rate_hz = interval_ms > 0 ? 1000 / interval_ms : 0};
+                                       .capture_ns = p->light->capture_time_ns};
         memcpy(f->position, p->light->map->world_from_probe.translation, sizeof(f->position));
     }
     return n;

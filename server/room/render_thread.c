@@ -21,19 +21,19 @@ struct turn {
 
 /**
  * The sequence that frames may wait for: each probe counts its own, and the one that began last is
- * meant, a replay's say. While it has not lit the room, no sequence has been reached; where it has
- * left without doing so, any light's counts.
+ * meant, a replay's say. While it has not lit the room, no sequence has been reached; where there
+ * is none any light's counts.
  */
 static uint64_t get_light_sequence_locked(struct gn_room *room) GN_REQUIRES(room->mu)
 {
-    const struct gn_lighting_state *light = room->light;
-    if (!light)
+    if (!room->light)
         return 0;
+    uint64_t newest = gn_probes_get_newest(&room->probes);
     for (int i = 0; i < room->n_reached; i++) {
-        if (room->reached[i].stream == room->newest_probe)
+        if (room->reached[i].stream == newest)
             return room->reached[i].sequence;
     }
-    return gn_room_find_locked(room, room->newest_probe) ? 0 : light->sequence;
+    return newest ? 0 : room->light->sequence;
 }
 
 /** Waits for a frame whose turn it is. False: the room stops. */

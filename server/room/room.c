@@ -201,15 +201,17 @@ void gn_room_leave(struct gn_room_session **session)
     room->n_subscribers -= s->want_lighting_states;
     if (s->slot >= 0)
         had_frame = gn_scheduler_remove(room->scheduler, s->slot, &job);
-    struct gn_lighting_state *light = gn_probes_leave(&room->probes, s->id);
-    if (light) {
+    struct gn_probe old;
+    gn_probes_leave(&room->probes, s->id, &old);
+    if (old.light) {
         room->is_light_stale = true;
         gn_cond_signal(&room->light_wake);
     }
+    gn_cond_signal(&room->render_wake); // nobody waits for its light any more
     gn_mutex_unlock(&room->mu);
     if (had_frame)
         gn_room_drop(room, &job, GN_MSG_DROP_REASON_SESSION_ENDED, "the session ended");
-    gn_lighting_state_unref(&light);
+    gn_probe_finish(&old);
     free(s);
     *session = NULL;
 }
@@ -369,23 +371,22 @@ int gn_room_put_environment(struct gn_room_session *session,
                             o->max_environment_height);
     struct gn_environment_job job = {
         .session_id = session->id, .frame = *frame, .payload = gn_buf_ref(payload)};
-    struct gn_environment_job superseded = {0};
+    struct gn_probe old;
     gn_mutex_lock(&room->mu);
     room->figures.environment_in++;
     session->figures.environment_in++;
-    if (is_first)
-        room->newest_probe = session->id;
-    int rc = gn_probes_put(&room->probes, &job, &superseded);
+    int rc = gn_probes_put(&room->probes, &job, is_first, &old);
     room->figures.environment_superseded += rc == 1;
     room->figures.environment_refused += rc < 0;
     gn_cond_signal(&room->light_wake);
     gn_mutex_unlock(&room->mu);
-    gn_buf_unref(&superseded.payload);
+    gn_probe_finish(&old);
     if (rc >= 0)
         return 0;
     gn_buf_unref(&job.payload);
-    return gn_error_set(out_error, rc, "room %s is lit by %d probes, it takes no more", o->name,
-                        GN_PROBES_MAX);
+    return gn_error_set(out_error, rc,
+                        "room %s has its %d probes: frames of another are taken once one has left",
+                        o->name, GN_PROBES_MAX);
 }
 
 int gn_room_put_emitter(struct gn_room_session *session, const struct gn_msg_emitter_frame *frame,

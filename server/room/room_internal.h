@@ -64,7 +64,6 @@ struct gn_room {
     bool is_light_stale;             // a probe has left: the others' lights are to be joined anew;
                                      // or the scene's own light is not shown yet
     bool has_failed_to_complete;     // a light that lacks what somebody could use stays as it is
-    uint64_t newest_probe;           // the session whose first environment frame came last
     struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
     int n_reached;                   // probes whose light is in `light`
     struct {

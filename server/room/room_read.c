@@ -11,19 +11,19 @@
  * Frames/s at 640 x 480 of all viewers together: the margin's share of what the median of the last
  * frames' times, each scaled to that size by its pixels, would allow.
  */
-static double get_holdable_locked(const struct gn_room *room)
+static double get_holdable(const struct gn_room *room, const struct gn_time_window *vga_ms)
 {
-    double ms = gn_time_window_get(&room->vga_ms, 0.5);
+    double ms = gn_time_window_get(vga_ms, 0.5);
     return ms > 0 ? room->options.holdable_margin * 1000 / ms : 0;
 }
 
 double gn_room_get_holdable_fps_with(struct gn_room *room, int more_viewers)
 {
     gn_mutex_lock(&room->mu);
-    double fps = get_holdable_locked(room);
+    struct gn_time_window vga = room->vga_ms;
     int n = room->n_viewers + more_viewers;
     gn_mutex_unlock(&room->mu);
-    return fps / (n > 1 ? n : 1);
+    return get_holdable(room, &vga) / (n > 1 ? n : 1);
 }
 
 void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figures)
@@ -33,12 +33,13 @@ void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figur
     out_figures->n_viewers = room->n_viewers;
     out_figures->n_probes = room->n_probes;
     out_figures->has_environment_waiting = gn_probes_has_frame(&room->probes);
-    out_figures->holdable_fps_room = get_holdable_locked(room);
+    struct gn_time_window vga = room->vga_ms;
     struct gn_time_window latency = room->latency_ms;
     struct gn_time_window busy = room->busy_ms;
     gn_mutex_unlock(&room->mu);
 
     int n = out_figures->n_viewers > 1 ? out_figures->n_viewers : 1;
+    out_figures->holdable_fps_room = get_holdable(room, &vga);
     out_figures->holdable_fps_viewer = out_figures->holdable_fps_room / n;
     out_figures->latency_p50_ms = gn_time_window_get(&latency, 0.5);
     out_figures->latency_p90_ms = gn_time_window_get(&latency, 0.9);
@@ -78,9 +79,14 @@ int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_se
 int gn_room_get_probes(struct gn_room *room,
                        struct gn_probe_figures out_probes[static GN_PROBES_MAX])
 {
+    struct gn_time_window intervals[GN_PROBES_MAX];
     gn_mutex_lock(&room->mu);
-    int n = gn_probes_get_figures(&room->probes, out_probes);
+    int n = gn_probes_get_figures(&room->probes, out_probes, intervals);
     gn_mutex_unlock(&room->mu);
+    for (int i = 0; i < n; i++) {
+        double ms = gn_time_window_get(&intervals[i], 0.5);
+        out_probes[i].rate_hz = ms > 0 ? 1000 / ms : 0;
+    }
     return n;
 }
 

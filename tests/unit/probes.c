@@ -10,6 +10,9 @@
 
 #include <cmocka.h>
 
+#include <stdlib.h>
+
+#include "server/room/same_frame.h"
 #include "tests/light_fixture.h"
 
 static struct gn_lighting_state *make_light(void)
@@ -24,30 +27,58 @@ static struct gn_lighting_state *make_light(void)
     return state;
 }
 
-static int put(struct gn_probes *probes, uint64_t session_id, uint64_t sequence)
+static int put_frame(struct gn_probes *probes, uint64_t session_id, uint64_t sequence, bool is_new)
 {
     const struct gn_environment_job job = {.session_id = session_id, .frame.sequence = sequence};
-    struct gn_environment_job superseded;
-    return gn_probes_put(probes, &job, &superseded);
+    struct gn_probe old;
+    int rc = gn_probes_put(probes, &job, is_new, &old);
+    gn_probe_finish(&old);
+    return rc;
+}
+
+static int put(struct gn_probes *probes, uint64_t session_id, uint64_t sequence)
+{
+    return put_frame(probes, session_id, sequence, sequence == 1);
 }
 
 static uint64_t take(struct gn_probes *probes, bool all)
 {
-    struct gn_environment_job job;
-    struct gn_lighting_state *light = NULL;
-    bool has = gn_probes_take(probes, all, &job, &light);
-    gn_lighting_state_unref(&light);
-    return has ? 100 * job.session_id + job.frame.sequence : 0;
+    struct gn_probe_work work;
+    if (!gn_probes_take(probes, all, &work))
+        return 0;
+    gn_lighting_state_unref(&work.light);
+    assert_null(work.worked);
+    return 100 * work.job.session_id + work.job.frame.sequence;
 }
 
-static void set_light(struct gn_probes *probes, uint64_t session_id, int n_old_expected)
+static void set_light(struct gn_probes *probes, uint64_t session_id, bool is_there_expected,
+                      int n_lights_gone_expected)
 {
-    struct gn_lighting_state *old[GN_PROBES_MAX];
-    int n_old;
-    gn_probes_set_light(probes, session_id, make_light(), 5, old, &n_old);
-    assert_int_equal(n_old, n_old_expected);
-    for (int i = 0; i < n_old; i++)
-        gn_lighting_state_unref(&old[i]);
+    struct gn_probe old[GN_PROBES_MAX];
+    int n_old, n_gone = 0;
+    bool is_there = gn_probes_set_light(probes, session_id, make_light(), NULL, 5, old, &n_old);
+    assert_int_equal(is_there, is_there_expected);
+    for (int i = 0; i < n_old; i++) {
+        n_gone += old[i].light != NULL;
+        gn_probe_finish(&old[i]);
+    }
+    assert_int_equal(n_gone, n_lights_gone_expected);
+}
+
+static void refuse(struct gn_probes *probes, uint64_t session_id)
+{
+    struct gn_probe old;
+    gn_probes_refuse(probes, session_id, NULL, &old);
+    gn_probe_finish(&old);
+}
+
+static bool leave(struct gn_probes *probes, uint64_t session_id)
+{
+    struct gn_probe old;
+    gn_probes_leave(probes, session_id, &old);
+    bool had_light = old.light != NULL;
+    gn_probe_finish(&old);
+    return had_light;
 }
 
 static int count_lights(const struct gn_probes *probes)
@@ -73,7 +104,7 @@ static void test_in_turn(void **state)
     assert_int_equal(take(&probes, true), 103);
     assert_int_equal(take(&probes, true), 0);
     // While nobody needs light only those that have lit nothing are taken.
-    set_light(&probes, 1, 0);
+    set_light(&probes, 1, true, 0);
     assert_int_equal(put(&probes, 1, 4), 0);
     assert_int_equal(take(&probes, false), 0);
     assert_true(gn_probes_has_frame(&probes));
@@ -87,38 +118,150 @@ static void test_who_stays(void **state)
 {
     (void)state;
     struct gn_probes probes = {0};
-    struct gn_lighting_state *light;
     for (uint64_t id = 1; id <= GN_PROBES_MAX; id++)
         assert_int_equal(put(&probes, id, 1), 0);
     assert_int_equal(put(&probes, 99, 1), -EUSERS);
-    set_light(&probes, 1, 0);
-    set_light(&probes, 2, 0);
+    set_light(&probes, 1, true, 0);
+    set_light(&probes, 2, true, 0);
     assert_int_equal(count_lights(&probes), 2);
-    light = gn_probes_leave(&probes, 1); // another has lit the room: at once
-    assert_non_null(light);
-    gn_lighting_state_unref(&light);
+    assert_true(leave(&probes, 1)); // another has lit the room: at once
     assert_int_equal(count_lights(&probes), 1);
-    assert_null(gn_probes_leave(&probes, 2)); // the last one's stays
+    assert_false(leave(&probes, 2)); // the last one's stays
     assert_int_equal(count_lights(&probes), 1);
-    set_light(&probes, 1, 1); // made late, of one that has left: it goes
+    set_light(&probes, 1, false, 1); // made late, of one that has left: it goes
     assert_int_equal(count_lights(&probes), 1);
-    set_light(&probes, 3, 1); // until another lights the room
+    set_light(&probes, 3, true, 1); // until another lights the room
     assert_int_equal(count_lights(&probes), 1);
     struct gn_probe_figures figures[GN_PROBES_MAX];
-    assert_int_equal(gn_probes_get_figures(&probes, figures), 1);
+    struct gn_time_window intervals[GN_PROBES_MAX];
+    assert_int_equal(gn_probes_get_figures(&probes, figures, intervals), 1);
     assert_int_equal(figures[0].session_id, 3);
     assert_false(figures[0].has_left);
-    assert_int_equal(put(&probes, 99, 1), 0);  // there is room again
-    assert_null(gn_probes_leave(&probes, 77)); // never sent anything
+    assert_int_equal(put(&probes, 99, 1), 0); // there is room again
+    assert_false(leave(&probes, 77));         // never sent anything
     gn_probes_finish(&probes);
     assert_int_equal(count_lights(&probes), 0);
+}
+
+/* Slots are for who lights the room, or may: not for who was only ever refused. */
+static void test_who_makes_room(void **state)
+{
+    (void)state;
+    struct gn_probes probes = {0};
+    for (uint64_t id = 1; id <= GN_PROBES_MAX; id++)
+        assert_int_equal(put(&probes, id, 1), 0);
+    for (uint64_t id = 1; id <= GN_PROBES_MAX; id++) {
+        if (id <= 3)
+            assert_int_equal(put(&probes, 99, id), -EUSERS); // all may light the room yet
+        assert_int_equal(take(&probes, true), 100 * id + 1);
+        if (id == 3)
+            refuse(&probes, id);
+        else
+            set_light(&probes, id, true, 0);
+    }
+    assert_int_equal(put(&probes, 3, 2), 0);
+    assert_int_equal(take(&probes, true), 302);
+    assert_int_equal(put(&probes, 99, 1), -EUSERS); // not while it is worked on
+    refuse(&probes, 3);
+    assert_int_equal(put(&probes, 3, 3), 0);
+    assert_int_equal(put(&probes, 99, 7), 1); // in place of that frame
+    assert_int_equal(put(&probes, 3, 4), -EUSERS);
+    refuse(&probes, 1); // has lit the room before: it stays
+    assert_int_equal(put(&probes, 3, 5), -EUSERS);
+    gn_probes_finish(&probes);
+}
+
+/* The probe whose sequence frames wait for. */
+static void test_who_is_newest(void **state)
+{
+    (void)state;
+    struct gn_probes probes = {0};
+    assert_int_equal(gn_probes_get_newest(&probes), 0);
+    assert_int_equal(put(&probes, 1, 1), 0);
+    assert_int_equal(take(&probes, true), 101);
+    set_light(&probes, 1, true, 0);
+    assert_int_equal(put(&probes, 2, 1), 0);
+    assert_int_equal(gn_probes_get_newest(&probes), 2); // its light is on its way
+    assert_int_equal(take(&probes, true), 201);
+    assert_int_equal(gn_probes_get_newest(&probes), 2);
+    refuse(&probes, 2);
+    assert_int_equal(gn_probes_get_newest(&probes), 1);
+    assert_int_equal(put(&probes, 2, 2), 0); // nor with the next, which may be as bad
+    assert_int_equal(gn_probes_get_newest(&probes), 1);
+    assert_int_equal(put_frame(&probes, 3, 9, false), 0); // its first one was refused before
+    assert_int_equal(gn_probes_get_newest(&probes), 1);
+    assert_int_equal(take(&probes, true), 309);
+    set_light(&probes, 3, true, 0);
+    assert_int_equal(gn_probes_get_newest(&probes), 3);
+    assert_int_equal(take(&probes, true), 202);
+    set_light(&probes, 2, true, 0);
+    assert_int_equal(gn_probes_get_newest(&probes), 2);
+    assert_int_equal(put(&probes, 1, 2), 0); // has begun long ago
+    refuse(&probes, 2);                      // has lit the room
+    assert_int_equal(gn_probes_get_newest(&probes), 2);
+    assert_true(leave(&probes, 2));
+    assert_int_equal(gn_probes_get_newest(&probes), 3);
+    gn_probes_finish(&probes);
+}
+
+static struct gn_worked_frame *make_worked(struct gn_buf *payload)
+{
+    struct gn_worked_frame *worked = calloc(1, sizeof(*worked));
+    assert_non_null(worked);
+    gn_worked_frame_keep(worked, &(struct gn_environment_job){.payload = payload});
+    return worked;
+}
+
+/* A probe's last frame is kept as long as the probe, whatever others send, and no longer. */
+static void test_worked_frames(void **state)
+{
+    (void)state;
+    struct gn_probes probes = {0};
+    struct gn_probe_work work;
+    struct gn_probe old[GN_PROBES_MAX];
+    struct gn_buf *payload;
+    int n_old;
+    assert_int_equal(gn_buf_create(16, &payload), 0);
+    for (uint64_t id = 1; id <= 2; id++) {
+        assert_int_equal(put(&probes, id, 1), 0);
+        assert_true(gn_probes_take(&probes, true, &work));
+        assert_null(work.worked);
+        assert_true(
+            gn_probes_set_light(&probes, id, make_light(), make_worked(payload), 5, old, &n_old));
+        gn_probe_finish(&old[0]);
+        assert_int_equal(n_old, 1);
+    }
+    assert_int_equal(put(&probes, 1, 2), 0);
+    assert_true(gn_probes_take(&probes, true, &work));
+    struct gn_worked_frame *mine = work.worked;
+    assert_non_null(mine);
+    gn_lighting_state_unref(&work.light);
+    gn_probes_refuse(&probes, 1, mine, &old[0]);
+    assert_null(old[0].worked);
+    assert_int_equal(put(&probes, 1, 3), 0);
+    assert_true(gn_probes_take(&probes, true, &work));
+    assert_ptr_equal(work.worked, mine); // a bad frame changes nothing
+    gn_lighting_state_unref(&work.light);
+    gn_probes_leave(&probes, 1, &old[0]);
+    gn_probe_finish(&old[0]);
+    assert_false(gn_probes_set_light(&probes, 1, make_light(), work.worked, 6, old, &n_old));
+    assert_ptr_equal(old[0].worked, mine); // it has left meanwhile
+    gn_probe_finish(&old[0]);
+    gn_probes_leave(&probes, 2, &old[0]); // its light stays, but no frame follows
+    assert_non_null(old[0].worked);
+    assert_null(old[0].light);
+    gn_probe_finish(&old[0]);
+    assert_int_equal(atomic_load(&payload->refs), 1);
+    gn_buf_unref(&payload);
+    gn_probes_finish(&probes);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_in_turn),
-        cmocka_unit_test(test_who_stays),
+        cmocka_unit_test(test_in_turn),        cmocka_unit_test(test_who_stays),
+        cmocka_unit_test(test_who_makes_room), cmocka_unit_test(test_who_is_newest),
+        cmocka_unit_test(test_worked_frames),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -364,6 +364,47 @@ static void waits_for_the_light_of_the_newest_probe(void **test)
     raze(&h);
 }
 
+/* One whose pixels are bad holds nobody up, and counts from its first good frame. */
+static void waits_for_no_probe_that_was_refused(void **test)
+{
+    (void)test;
+    static uint8_t picture[WIDTH * HEIGHT * 3];
+    struct house h;
+    struct gn_error error = {0};
+    struct gn_msg_environment_frame frame = make_header();
+    struct gn_buf *pixels = make_pixels(0, 1);
+    build(&h, DIFFUSE, 0, false);
+    light_up(&h, 0.1, 1);
+    struct gn_room_session *bad = join(&h, GN_MSG_ROLE_PROBE, false);
+    frame.sequence = 1;
+    frame.pixel_format = GN_MSG_PIXEL_FORMAT_JPEG;
+    assert_int_equal(gn_room_put_environment(bad, &frame, pixels, &error), 0);
+    for (int i = 0; get_figures(&h).environment_refused == 0; i++) {
+        assert_true(i < 20000);
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+    light_up(&h, 0.1, 2);
+    send_frame(&h, 2, 60000);
+    assert_int_equal(take_result(&h, 20000, picture), 2);
+    frame.sequence = 2;
+    frame.pixel_format = GN_MSG_PIXEL_FORMAT_RGB_F16;
+    frame.scale = 2;
+    assert_int_equal(gn_room_put_environment(bad, &frame, pixels, &error), 0);
+    for (int i = 0; get_figures(&h).light_published < 3; i++) {
+        assert_true(i < 20000);
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+    light_up(&h, 0.1, 3);
+    send_frame(&h, 3, 60000);
+    assert_int_equal(take_result(&h, 150, picture), 0); // 3 is the other's now
+    frame.sequence = 3;
+    assert_int_equal(gn_room_put_environment(bad, &frame, pixels, &error), 0);
+    assert_int_equal(take_result(&h, 20000, picture), 3);
+    gn_buf_unref(&pixels);
+    gn_room_leave(&bad);
+    raze(&h);
+}
+
 static struct gn_environment_job make_job(enum gn_msg_pixel_format format, size_t n_bytes)
 {
     struct gn_environment_job job = {.session_id = 1, .frame = make_header()};
@@ -485,6 +526,7 @@ int main(void)
         cmocka_unit_test(makes_harmonics_only_for_who_uses_them),
         cmocka_unit_test(makes_lights_only_for_who_uses_them),
         cmocka_unit_test(waits_for_the_light_of_the_newest_probe),
+        cmocka_unit_test(waits_for_no_probe_that_was_refused),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
