@@ -67,6 +67,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
                 .shadow_unweighted = !gn_options_get_bool(o, "room", room, "shadow-cosine"),
                 .shadow_ignore_real = !gn_options_get_bool(o, "room", room, "shadow-real-blockers"),
             },
+        .emitters = {.n_pieces = gn_options_get_int(o, "room", room, "emitter-pieces")},
         .environment_noise = gn_options_get_double(o, "room", room, "environment-noise"),
         .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
         .refuse_reference = !gn_options_get_bool(o, "room", room, "allow-reference"),

@@ -96,6 +96,10 @@ static const struct gn_option table[] = {
      .help = "Time constant by which light at rest follows the environment frames, so that the "
              "sensor's noise does not move it; what changes by more than noise is followed within "
              "100 ms whatever is given here. 0: each frame stands alone."},
+    {ROOM, .key = "emitter-pieces", .type = GN_OPTION_INT, .min = 1, .max = GN_NEAR_LIGHTS_MAX,
+     .default_value = "32",
+     .help = "Into how many lights the scene's emissive meshes are cut together; one that faces "
+             "several ways has one for each of up to 6 in any case."},
     {ROOM, .key = "environment-noise", .type = GN_OPTION_DOUBLE, .min = 0, .max = 0.1,
      .default_value = "0.004",
      .help = "An environment frame that differs from the last one worked on by at most this share "

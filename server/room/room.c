@@ -72,7 +72,7 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
         gn_error_set(out_error, rc, "room %s: %s", room->name, scene_error.text);
         goto out;
     }
-    rc = gn_emitters_create(room->scene, NULL, &room->emitters, &scene_error);
+    rc = gn_emitters_create(room->scene, &room->options.emitters, &room->emitters, &scene_error);
     if (rc == 0)
         rc = gn_screens_init(&room->screens, room->emitters);
     if (rc < 0) {

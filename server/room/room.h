@@ -29,6 +29,7 @@ struct gn_room_options {
     const char *scene_path;             // of scene.json
     struct gn_light_options light;      // all-zero: defaults
     struct gn_radiance_map_options map; // all-zero: defaults
+    struct gn_emitter_options emitters; // all-zero: defaults
     double environment_noise; // share by which radiance may differ in a frame that counts as the
                               // same, [0, 0.1]; 0: frames that are the same to the byte
     struct gn_render_options render;           // quality and seed are each frame's own

@@ -29,8 +29,8 @@ SCENE = '{"objects": [{"mesh": "floor.obj", "role": "real"}, {"mesh": "cube.obj"
 RED, BLUE, BLACK = b'\xff\x10\x10', b'\x10\x10\xff', b'\0\0\0'
 
 
-def open_room():
-    room = Room(scene=SCENE)
+def open_room(settings=''):
+    room = Room(settings, scene=SCENE)
     room.write('tv.obj', TV)
     return Daemon(rooms=room)
 
@@ -81,6 +81,17 @@ def test_red_to_blue_in_the_dark():
         assert red[0] > 60 and red[0] > 2 * red[2], red
         assert blue[2] > 60 and blue[2] > 2 * blue[0], blue
         assert off == b'\0\0\0', off
+
+
+def test_pieces():
+    """Both screens are cut into as many lights as the room asks for; of the dark one none is used."""
+    for settings, n in (('', 32), ('emitter-pieces = 1', 1), ('emitter-pieces = 200', 200)):
+        with open_room(settings) as daemon, Viewer(daemon) as viewer, screen(daemon) as tv:
+            tv.send(EMITTER_FRAME, *picture(1, RED))
+            wait_for_shown(daemon, 1)
+            look(viewer)
+            found = read_room(daemon)['near_lights']
+            assert n / 2 <= found <= n, (settings, found)
 
 
 def test_beside_a_probe():
@@ -189,4 +200,4 @@ def test_command():
         shutil.rmtree(folder)
 
 
-run_tests([test_red_to_blue_in_the_dark, test_beside_a_probe, test_refusals, test_command])
+run_tests([test_red_to_blue_in_the_dark, test_pieces, test_beside_a_probe, test_refusals, test_command])
