@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/light/luminance.h"
 #include "server/light/temporal.h"
 #include "tests/unit/cmocka_setup.h"
 
@@ -51,9 +52,13 @@ static inline struct gn_temporal_input get_input(const struct play *p)
                                       .lights = p->lights,
                                       .n_values = 3};
     memcpy(input.values, p->values, sizeof(p->values));
-    for (int i = 0; i < p->n; i++)
+    for (int i = 0; i < p->n; i++) {
+        const double dir[3] = {(double)p->lights[i].dir_world[0], (double)p->lights[i].dir_world[1],
+                               (double)p->lights[i].dir_world[2]};
+        gn_change_add(input.sums, dir, gn_luminance(p->lights[i].irradiance));
         for (int c = 0; c < 3; c++)
             input.total[c] += (double)p->lights[i].irradiance[c];
+    }
     return input;
 }
 

@@ -4,10 +4,9 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdatomic.h>
-#include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "server/light/state_copy.h"
 
 int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int newest,
                            struct gn_lighting_state **out_state)
@@ -17,30 +16,12 @@ int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int n
         *out_state = gn_lighting_state_ref(states[0]);
         return 0;
     }
-    const struct gn_lighting_state *first = states[0], *times = states[newest];
-    struct gn_lighting_state *s = calloc(1, sizeof(*s));
+    const struct gn_lighting_state *times = states[newest];
+    struct gn_lighting_state *s = gn_lighting_state_copy(states[0]);
     if (!s)
         return -ENOMEM;
-    size_t lights_bytes = (size_t)first->n_lights * sizeof(*s->lights);
-    // All but the counter, which others change meanwhile.
-    memcpy((char *)s + offsetof(struct gn_lighting_state, map),
-           (const char *)first + offsetof(struct gn_lighting_state, map),
-           sizeof(*s) - offsetof(struct gn_lighting_state, map));
-    atomic_init(&s->references, 1);
-    s->lights = malloc(lights_bytes + 1);
-    s->near = NULL;
-    s->n_near = 0;
-    s->emission = NULL;
-    s->map = gn_radiance_map_ref(first->map);
-    s->plan = NULL; // what only the next state of one probe needs
-    s->temporal = NULL;
-    s->memory = NULL;
     s->figures = times->figures;
     s->in_time = times->in_time;
-    s->irradiance = first->irradiance;
-    s->has_lights = first->has_lights;
-    s->in_time = times->in_time;
-    s->stream = first->stream;
     s->sequence = times->sequence;
     s->capture_time_ns = times->capture_time_ns;
     s->published_time_ns = times->published_time_ns;
@@ -48,11 +29,6 @@ int gn_lighting_state_join(struct gn_lighting_state *const *states, int n, int n
     s->ms_sh = times->ms_sh;
     s->ms_lights = times->ms_lights;
     s->ms_temporal = times->ms_temporal;
-    if (!s->lights) {
-        gn_lighting_state_unref(&s);
-        return -ENOMEM;
-    }
-    memcpy(s->lights, first->lights, lights_bytes);
     for (int i = 1; i < n; i++)
         s->others[s->n_others++] = gn_lighting_state_ref(states[i]);
     *out_state = s;

@@ -2,12 +2,9 @@
 /* SPDX-License-Identifier: ISC */
 /* Near light of a lighting state. */
 #include <errno.h>
-#include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "server/light/partition_plan.h"
-#include "server/light/state.h"
+#include "server/light/state_copy.h"
 
 static bool gives_light(const struct gn_near_light *light)
 {
@@ -70,27 +67,10 @@ int gn_lighting_state_replace_emission(const struct gn_lighting_state *state,
                                        struct gn_lighting_state **out_state)
 {
     *out_state = NULL;
-    struct gn_lighting_state *copy = malloc(sizeof(*copy));
+    struct gn_lighting_state *copy = gn_lighting_state_copy(state);
     if (!copy)
         return -ENOMEM;
-    memcpy(copy, state, sizeof(*copy));
-    atomic_init(&copy->references, 1);
-    (void)gn_radiance_map_ref(copy->map);
-    if (copy->plan)
-        (void)gn_partition_plan_ref(copy->plan);
-    for (int i = 0; i < copy->n_others; i++)
-        (void)gn_lighting_state_ref(copy->others[i]);
-    // What is kept for the next frame stays with the original.
-    copy->temporal = NULL;
-    copy->memory = NULL;
-    copy->emission = NULL;
-    copy->near = NULL;
-    copy->n_near = 0;
-    copy->lights = malloc((size_t)state->n_lights * sizeof(*copy->lights) + 1);
-    if (copy->lights && state->n_lights > 0)
-        memcpy(copy->lights, state->lights, (size_t)state->n_lights * sizeof(*copy->lights));
-    if (!copy->lights || gn_lighting_state_set_emission(copy, emission) < 0) {
-        copy->n_lights = copy->lights ? copy->n_lights : 0;
+    if (gn_lighting_state_set_emission(copy, emission) < 0) {
         gn_lighting_state_unref(&copy);
         return -ENOMEM;
     }

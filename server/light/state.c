@@ -13,6 +13,7 @@
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
 #include "server/light/method.h"
+#include "server/light/state_copy.h"
 #include "server/light/temporal.h"
 
 /* A light with its place in the list, which decides between equals. */
@@ -107,6 +108,11 @@ static int make_from_rest(struct gn_lighting_state *state, struct gn_light_setti
     return rc;
 }
 
+static double to_ms(int64_t duration_ns)
+{
+    return (double)duration_ns / (double)GN_NS_PER_MS;
+}
+
 static int make_lights(struct gn_lighting_state *state, const struct gn_light_options *options,
                        struct gn_pool *pool, struct gn_error *out_error)
 {
@@ -114,7 +120,12 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     int rc = gn_light_settings_init(&settings, options, state->map, out_error);
     if (rc < 0)
         return rc;
+    int64_t start_ns = gn_clock_get_monotonic_ns();
     struct gn_light_list list = {0};
+    gn_partition_plan_unref(&state->plan);
+    gn_light_memory_unref(&state->memory);
+    free(state->lights);
+    state->lights = NULL;
     state->memory = calloc(1, sizeof(*state->memory));
     rc = state->memory ? 0 : -ENOMEM;
     if (rc == 0)
@@ -130,18 +141,21 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     if (rc == 0)
         place_lights(state);
     gn_light_list_finish(&list);
+    state->has_lights = true;
+    state->ms_lights = to_ms(gn_clock_get_monotonic_ns() - start_ns);
     return rc < 0 ? gn_error_set(out_error, rc, "lights: no memory") : 0;
 }
 
-static double to_ms(int64_t duration_ns)
+/* Irradiance of all directions, the fill's among them. */
+static void get_total(const struct gn_radiance_map *map, double out_total[static 3])
 {
-    return (double)duration_ns / (double)GN_NS_PER_MS;
+    for (int c = 0; c < 3; c++)
+        out_total[c] =
+            map->figures.shown_irradiance[c] + (double)map->fill[c] * map->fill_solid_angle;
 }
 
 /* What follows the frames takes the place of what this one says. */
-static int publish_smoothed(struct gn_lighting_state *state,
-                            const struct gn_lighting_state *previous,
-                            const struct gn_light_options *options)
+static int publish_lights(struct gn_lighting_state *state)
 {
     const struct gn_temporal *t = state->temporal;
     struct gn_light *lights = malloc((size_t)t->n_lights * sizeof(*lights) + 1);
@@ -154,14 +168,49 @@ static int publish_smoothed(struct gn_lighting_state *state,
     state->n_lights = t->n_lights;
     memcpy(state->total_irradiance, t->total, sizeof(t->total));
     state->in_time = t->figures;
-    if (!state->has_sh)
-        return 0;
-    memcpy(state->sh, t->values, sizeof(state->sh));
-    state->irradiance = state->frame_irradiance;
-    if (t->values_share < 1)
-        gn_irradiance_follow(&state->irradiance, &previous->irradiance, t->values_share,
-                             (const double(*)[3])state->sh, options->irradiance.dering);
     return 0;
+}
+
+static void publish_harmonics(struct gn_lighting_state *state,
+                              const struct gn_lighting_state *previous,
+                              const struct gn_light_options *options)
+{
+    const struct gn_temporal *t = state->temporal;
+    struct gn_irradiance *irradiance = &state->irradiance;
+    bool is_scaled = t->factor[0] != 1 || t->factor[1] != 1 || t->factor[2] != 1;
+    memcpy(state->sh, t->values, sizeof(state->sh));
+    *irradiance = state->frame_irradiance;
+    for (int i = 0; is_scaled && i < irradiance->n_lights; i++)
+        for (int c = 0; c < 3; c++)
+            irradiance->lights[i].irradiance[c] *= t->factor[c];
+    if (t->values_share < 1 || is_scaled)
+        gn_irradiance_follow(irradiance, t->values_share < 1 ? &previous->irradiance : NULL,
+                             t->values_share, (const double(*)[3])state->sh,
+                             options->irradiance.dering);
+}
+
+static int publish_smoothed(struct gn_lighting_state *state,
+                            const struct gn_lighting_state *previous,
+                            const struct gn_light_options *options)
+{
+    int rc = publish_lights(state);
+    if (rc == 0 && state->has_sh)
+        publish_harmonics(state, previous, options);
+    return rc;
+}
+
+/* What the frame alone says; its sums of places, which only a step reads, are not in it. */
+static void get_input(const struct gn_lighting_state *state, struct gn_temporal_input *out)
+{
+    *out = (struct gn_temporal_input){.time_ns = state->capture_time_ns,
+                                      .has_lights = state->has_lights,
+                                      .n_lights = state->n_lights,
+                                      .lights = state->lights,
+                                      .n_values = state->has_sh ? 3 * GN_SH_MAX : 0};
+    _Static_assert(3 * GN_SH_MAX <= GN_TEMPORAL_VALUES_MAX, "all harmonics are followed");
+    get_total(state->map, out->total);
+    if (state->has_sh)
+        memcpy(out->values, state->sh, sizeof(state->sh));
 }
 
 static int smooth(struct gn_lighting_state *state, const struct gn_light_options *options)
@@ -169,47 +218,42 @@ static int smooth(struct gn_lighting_state *state, const struct gn_light_options
     const struct gn_temporal *kept = options->previous && options->previous->stream == state->stream
                                          ? options->previous->temporal
                                          : NULL;
-    struct gn_temporal_input input = {.time_ns = state->capture_time_ns,
-                                      .has_lights = state->has_lights,
-                                      .n_lights = state->n_lights,
-                                      .lights = state->lights,
-                                      .n_values = state->has_sh ? 3 * GN_SH_MAX : 0};
-    _Static_assert(3 * GN_SH_MAX <= GN_TEMPORAL_VALUES_MAX, "all harmonics are followed");
-    memcpy(input.total, state->total_irradiance, sizeof(input.total));
-    if (state->has_sh)
-        memcpy(input.values, state->sh, sizeof(state->sh));
+    struct gn_temporal_input input;
+    get_input(state, &input);
+    gn_change_measure(state->map, input.sums);
     state->frame_irradiance = state->irradiance;
     int rc = gn_temporal_follow(kept, &input, options->smoothing, &state->temporal);
     return rc < 0 ? rc : publish_smoothed(state, options->previous, options);
+}
+
+static int make_harmonics(struct gn_lighting_state *state, const struct gn_light_options *options,
+                          struct gn_pool *pool, struct gn_error *out_error)
+{
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    if (gn_irradiance_init_from_map(&state->irradiance, state->sh, state->map, &options->irradiance,
+                                    pool) < 0)
+        return gn_error_set(out_error, -ENOMEM, "spherical harmonics: no memory");
+    state->has_sh = true;
+    state->ms_sh = to_ms(gn_clock_get_monotonic_ns() - start_ns);
+    return 0;
 }
 
 /* All but the map, which is there, and the frame's names. */
 static int fill_from_map(struct gn_lighting_state *state, const struct gn_light_options *options,
                          struct gn_pool *pool, struct gn_error *out_error)
 {
-    int64_t start_ns = gn_clock_get_monotonic_ns();
-    int rc = 0;
-    state->has_sh = !options->no_sh;
-    if (state->has_sh && gn_irradiance_init_from_map(&state->irradiance, state->sh, state->map,
-                                                     &options->irradiance, pool) < 0)
-        return gn_error_set(out_error, -ENOMEM, "spherical harmonics: no memory");
-    int64_t sh_ns = gn_clock_get_monotonic_ns();
-    state->has_lights = !options->no_lights;
-    if (state->has_lights)
+    int rc = options->no_sh ? 0 : make_harmonics(state, options, pool, out_error);
+    if (rc == 0 && !options->no_lights)
         rc = make_lights(state, options, pool, out_error);
     if (rc < 0)
         return rc;
-    int64_t lights_ns = gn_clock_get_monotonic_ns();
-    for (int c = 0; c < 3; c++)
-        state->total_irradiance[c] = state->map->figures.shown_irradiance[c] +
-                                     (double)state->map->fill[c] * state->map->fill_solid_angle;
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    get_total(state->map, state->total_irradiance);
     state->stream = options->stream;
     if (options->smoothing > 0 && smooth(state, options) < 0)
         return gn_error_set(out_error, -ENOMEM, "light in time: no memory");
     state->published_time_ns = gn_clock_get_monotonic_ns();
-    state->ms_sh = to_ms(sh_ns - start_ns);
-    state->ms_lights = to_ms(lights_ns - sh_ns);
-    state->ms_temporal = to_ms(state->published_time_ns - lights_ns);
+    state->ms_temporal = to_ms(state->published_time_ns - start_ns);
     return 0;
 }
 
@@ -263,6 +307,22 @@ int gn_lighting_state_create(const struct gn_environment_frame *frame,
     return 0;
 }
 
+/* The filter's step is done: what is new begins beside what it keeps. */
+static int complete_in_time(struct gn_lighting_state *made, const struct gn_lighting_state *state,
+                            const struct gn_light_options *options)
+{
+    struct gn_temporal_input input;
+    get_input(made, &input);
+    int rc = gn_temporal_complete(state->temporal, &input, &made->temporal);
+    if (rc == 0 && !state->has_lights)
+        rc = publish_lights(made);
+    if (rc == 0 && !state->has_sh && made->has_sh) {
+        made->frame_irradiance = made->irradiance;
+        publish_harmonics(made, state, options);
+    }
+    return rc;
+}
+
 int gn_lighting_state_complete(const struct gn_lighting_state *state,
                                const struct gn_light_options *options, struct gn_pool *pool,
                                struct gn_lighting_state **out_state, struct gn_error *out_error)
@@ -270,49 +330,25 @@ int gn_lighting_state_complete(const struct gn_lighting_state *state,
     *out_state = NULL;
     struct gn_light_options with_tables = *options;
     with_tables.previous = state;
-    with_tables.stream = state->stream;
     int rc = check_options(options, out_error);
-    struct gn_lighting_state *made = rc == 0 ? make_empty(out_error) : NULL;
+    if (rc < 0)
+        return rc;
+    struct gn_lighting_state *made = gn_lighting_state_copy(state);
     if (!made)
-        return rc < 0 ? rc : -ENOMEM;
-    made->sequence = state->sequence;
-    made->capture_time_ns = state->capture_time_ns;
-    made->ms_map = state->ms_map;
-    made->map = gn_radiance_map_ref(state->map);
-    rc = fill_from_map(made, &with_tables, pool, out_error);
+        return gn_error_set(out_error, -ENOMEM, "lighting state: no memory");
+    if (!options->no_sh && !state->has_sh)
+        rc = make_harmonics(made, options, pool, out_error);
+    if (rc == 0 && !options->no_lights && !state->has_lights)
+        rc = make_lights(made, &with_tables, pool, out_error);
+    if (rc == 0 && state->temporal && (rc = complete_in_time(made, state, options)) < 0)
+        (void)gn_error_set(out_error, rc, "light in time: no memory");
     if (rc < 0) {
         gn_lighting_state_unref(&made);
         return rc;
     }
+    made->published_time_ns = gn_clock_get_monotonic_ns();
     *out_state = made;
     return 0;
-}
-
-/* A state with the same light; what others share is shared. */
-static struct gn_lighting_state *copy_light(const struct gn_lighting_state *state)
-{
-    struct gn_lighting_state *copy = make_empty(NULL);
-    if (!copy)
-        return NULL;
-    copy->map = gn_radiance_map_ref(state->map);
-    copy->plan = state->plan ? gn_partition_plan_ref(state->plan) : NULL;
-    copy->memory = state->memory ? gn_light_memory_ref(state->memory) : NULL;
-    copy->has_sh = state->has_sh;
-    memcpy(copy->sh, state->sh, sizeof(copy->sh));
-    copy->irradiance = state->irradiance;
-    copy->frame_irradiance = state->frame_irradiance;
-    copy->has_lights = state->has_lights;
-    memcpy(copy->total_irradiance, state->total_irradiance, sizeof(copy->total_irradiance));
-    copy->figures = state->figures;
-    copy->lights = malloc((size_t)state->n_lights * sizeof(*copy->lights) + 1);
-    if (!copy->lights) {
-        gn_lighting_state_unref(&copy);
-        return NULL;
-    }
-    if (state->n_lights > 0)
-        memcpy(copy->lights, state->lights, (size_t)state->n_lights * sizeof(*copy->lights));
-    copy->n_lights = state->n_lights;
-    return copy;
 }
 
 int gn_lighting_state_advance(const struct gn_lighting_state *state, uint64_t sequence,
@@ -321,10 +357,9 @@ int gn_lighting_state_advance(const struct gn_lighting_state *state, uint64_t se
 {
     int64_t start_ns = gn_clock_get_monotonic_ns();
     *out_state = NULL;
-    struct gn_lighting_state *copy = copy_light(state);
+    struct gn_lighting_state *copy = gn_lighting_state_copy(state);
     if (!copy)
         return -ENOMEM;
-    copy->stream = state->stream;
     copy->sequence = sequence;
     copy->capture_time_ns = capture_time_ns;
     int rc = 0;
@@ -342,28 +377,4 @@ int gn_lighting_state_advance(const struct gn_lighting_state *state, uint64_t se
     copy->ms_temporal = to_ms(copy->published_time_ns - start_ns);
     *out_state = copy;
     return 0;
-}
-
-struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state)
-{
-    atomic_fetch_add_explicit(&state->references, 1, memory_order_relaxed);
-    return state;
-}
-
-void gn_lighting_state_unref(struct gn_lighting_state **state)
-{
-    struct gn_lighting_state *s = *state;
-    *state = NULL;
-    if (!s || atomic_fetch_sub_explicit(&s->references, 1, memory_order_acq_rel) != 1)
-        return;
-    gn_light_memory_unref(&s->memory);
-    free(s->temporal);
-    for (int i = 0; i < s->n_others; i++)
-        gn_lighting_state_unref(&s->others[i]);
-    gn_partition_plan_unref(&s->plan);
-    gn_radiance_map_unref(&s->map);
-    gn_emission_unref(&s->emission);
-    free(s->near);
-    free(s->lights);
-    free(s);
 }

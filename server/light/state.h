@@ -197,8 +197,10 @@ GN_MUST_USE int gn_lighting_state_advance(const struct gn_lighting_state *state,
                                           const struct gn_light_options *options,
                                           struct gn_lighting_state **out_state);
 /**
- * The state made anew from its map with what the options ask for now and it had left out; same
- * sequence and time. Smoothing starts anew. Returns 0 or a negative errno and a sentence.
+ * The same light with what the options ask for now and it had left out, made from its map; same
+ * sequence and time. What was there stays as it is, to the bit, and smoothing goes on as if nothing
+ * had been asked; where light is smoothed, what is new begins with the power of the smoothed total.
+ * Returns 0 or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_lighting_state_complete(const struct gn_lighting_state *state,
                                            const struct gn_light_options *options,

@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "common/clock.h"
-#include "server/light/temporal_change.h"
 
 /* A light whose direction jumps further than this does not turn: it fades out here, in there. */
 static const double cos_jump = 0.866025403784439; // 30 degrees
@@ -137,22 +136,17 @@ static void set_pace(struct step *s, double deviation)
     f->alpha = s->alpha = -expm1(-1e-3 * f->dt_ms * rate);
 }
 
+/* What has changed on the map sets the pace of all that is made of it. */
 static void find_change(struct step *s)
 {
-    double dir[3];
-    gn_change_init(&s->change);
-    for (int i = 0; i < s->kept->n_lights; i++) {
-        get_direction(&s->kept->lights[i], dir);
-        gn_change_add(&s->change, false, dir, get_luminance(s->kept->lights[i].irradiance));
-    }
-    for (int i = 0; i < s->input->n_lights; i++) {
-        struct gn_temporal_light light;
-        set_raw(&light, &s->input->lights[i]);
-        get_direction(&light, dir);
-        gn_change_add(&s->change, true, dir, get_luminance(light.irradiance));
-    }
-    gn_change_find(&s->change);
+    const double *before = s->kept->sums, *after = s->input->sums;
+    gn_change_find(&s->change, before, after);
     set_pace(s, s->change.deviation);
+    for (int i = 0; i < GN_CHANGE_SUMS; i++) {
+        double alpha = s->change.is_changed[i] ? 1 : s->alpha;
+        s->out->sums[i] = before[i];
+        (void)approach(&s->out->sums[i], after[i], alpha, after[GN_CHANGE_WINDOWS]);
+    }
 }
 
 /* The light takes its end value at once; the total with it. */
@@ -301,16 +295,57 @@ static bool is_light_settled(const struct gn_temporal_light *light)
            memcmp(light->moment, end.moment, sizeof(end.moment)) == 0;
 }
 
+/* What takes the frame's values to the power that the filtered light has. */
+static void get_factor(const struct gn_temporal *t, const struct gn_temporal_input *input,
+                       double out_factor[static 3])
+{
+    for (int c = 0; c < 3; c++)
+        out_factor[c] = input->total[c] > 0 ? t->total[c] / input->total[c] : 1;
+}
+
+/* Lights that were left out until now: those of the frame, with the power of the filtered light. */
+static void add_lights(struct gn_temporal *out, const struct gn_temporal_input *input)
+{
+    double factor[3];
+    get_factor(out, input, factor);
+    for (int i = 0; i < input->n_lights; i++) {
+        struct gn_temporal_light *light = &out->lights[i];
+        set_raw(light, &input->lights[i]);
+        double luminance = get_luminance(light->irradiance);
+        for (int c = 0; c < 3; c++)
+            light->irradiance[c] *= factor[c];
+        double ratio = luminance > 0 ? get_luminance(light->irradiance) / luminance : 1;
+        for (int c = 0; c < 3; c++)
+            light->moment[c] *= ratio;
+    }
+    out->n_lights = input->n_lights;
+    qsort(out->lights, (size_t)out->n_lights, sizeof(*out->lights), compare_lights);
+}
+
+/* Values that were left out until now: the same of them. */
+static void add_values(struct gn_temporal *out, const struct gn_temporal_input *input)
+{
+    get_factor(out, input, out->factor);
+    for (int i = 0; i < input->n_values; i++)
+        out->values[i] = out->factor[i % 3] * input->values[i];
+    out->values_share = 1;
+    for (int c = 0; c < 3 && input->n_values > 0; c++)
+        out->is_settled = out->is_settled && out->factor[c] == 1;
+}
+
 static void follow_values(struct step *s)
 {
     const struct gn_temporal_input *input = s->input;
     double scale = 0, alpha = s->change.any ? 1 : s->alpha;
-    bool has_values = s->kept->input.n_values == input->n_values;
-    s->out->values_share = has_values ? alpha : 1;
+    if (s->kept->input.n_values != input->n_values) {
+        add_values(s->out, input);
+        return;
+    }
+    s->out->values_share = alpha;
     for (int i = 0; i < input->n_values; i++)
         scale = fmax(scale, fabs(input->values[i]));
     for (int i = 0; i < input->n_values; i++) {
-        s->out->values[i] = has_values ? s->kept->values[i] : input->values[i];
+        s->out->values[i] = s->kept->values[i];
         if (!approach(&s->out->values[i], input->values[i], alpha, scale))
             s->out->is_settled = false;
     }
@@ -320,7 +355,6 @@ static void follow_lights(struct step *s)
 {
     struct gn_temporal *out = s->out;
     match_lights(s);
-    find_change(s);
     for (int k = 0; k < 3; k++)
         out->total[k] = s->kept->total[k] + s->alpha * (s->input->total[k] - s->kept->total[k]);
     for (int i = 0; i < s->input->n_lights; i++) {
@@ -335,28 +369,24 @@ static void follow_lights(struct step *s)
     prune(out);
 }
 
-/* Without lights, only the whole says what has changed, and follows alone. */
+/* Where the lights do not say what it is. */
 static void follow_total(struct step *s)
 {
     double scale = get_luminance(s->input->total);
-    const double up[3] = {0, 0, 1};
-    gn_change_init(&s->change);
-    gn_change_add(&s->change, false, up, get_luminance(s->kept->total));
-    gn_change_add(&s->change, true, up, scale);
-    gn_change_find(&s->change);
-    double deviation = s->change.deviation, largest = 0;
-    bool has_values = s->kept->input.n_values == s->input->n_values;
-    for (int i = 0; i < s->input->n_values; i++)
-        largest = fmax(largest, fabs(s->input->values[i]));
-    for (int i = 0; has_values && largest > 0 && i < s->input->n_values; i++)
-        deviation = fmax(deviation, fabs(s->input->values[i] - s->kept->values[i]) / largest);
-    set_pace(s, deviation);
     for (int k = 0; k < 3; k++) {
         double *total = &s->out->total[k];
         *total = s->kept->total[k];
         if (!approach(total, s->input->total[k], s->change.any ? 1 : s->alpha, scale))
             s->out->is_settled = false;
     }
+}
+
+static bool are_lights_settled(const struct gn_temporal *t)
+{
+    for (int i = 0; i < t->n_lights; i++)
+        if (!is_light_settled(&t->lights[i]))
+            return false;
+    return true;
 }
 
 static int take_step(struct step *s)
@@ -369,15 +399,18 @@ static int take_step(struct step *s)
     s->next_of_kept = (int *)(s->names + n_kept + n_raw);
     s->kept_of = s->next_of_kept + n_kept;
     out->is_settled = true;
-    if (s->input->has_lights)
+    find_change(s);
+    if (s->input->has_lights && s->kept->input.has_lights) {
         follow_lights(s);
-    else
+        if (are_lights_settled(out)) // each light is there: their sum is
+            memcpy(out->total, s->input->total, sizeof(out->total));
+    } else {
         follow_total(s);
+        if (s->input->has_lights)
+            add_lights(out, s->input);
+    }
     follow_values(s);
-    for (int i = 0; i < out->n_lights; i++)
-        out->is_settled = out->is_settled && is_light_settled(&out->lights[i]);
-    if (out->is_settled) // each light is there: their sum is
-        memcpy(out->total, s->input->total, sizeof(out->total));
+    out->is_settled = out->is_settled && are_lights_settled(out);
     free(s->names);
     return 0;
 }
@@ -390,37 +423,62 @@ static void start(const struct gn_temporal_input *input, struct gn_temporal *out
     out->values_share = 1;
     out->is_settled = true;
     memcpy(out->total, input->total, sizeof(out->total));
+    memcpy(out->sums, input->sums, sizeof(out->sums));
     memcpy(out->values, input->values, sizeof(out->values));
     out->n_lights = input->n_lights;
     for (int i = 0; i < input->n_lights; i++)
         set_raw(&out->lights[i], &input->lights[i]);
 }
 
-static struct gn_temporal *hold(const struct gn_temporal *kept)
+int gn_temporal_complete(const struct gn_temporal *kept, const struct gn_temporal_input *input,
+                         struct gn_temporal **out_temporal)
 {
-    size_t size = sizeof(*kept) + (size_t)kept->n_lights * sizeof(kept->lights[0]);
-    struct gn_temporal *out = malloc(size);
+    bool keeps_lights = input->has_lights && kept->input.has_lights;
+    size_t n_kept = keeps_lights ? (size_t)kept->n_lights : 0;
+    size_t n = n_kept + (keeps_lights ? 0 : (size_t)input->n_lights);
+    struct gn_temporal *out = malloc(sizeof(*out) + n * sizeof(out->lights[0]));
+    *out_temporal = out;
     if (!out)
-        return NULL;
-    memcpy(out, kept, size);
-    out->figures = (struct gn_temporal_figures){.verdict = GN_TEMPORAL_HOLD,
-                                                .n_fading = kept->figures.n_fading};
+        return -ENOMEM;
+    memcpy(out, kept, sizeof(*out) + n_kept * sizeof(out->lights[0]));
+    out->n_lights = (int)n_kept;
+    out->input.has_lights = input->has_lights;
+    if (input->has_lights && !keeps_lights)
+        add_lights(out, input);
+    if (kept->input.n_values != input->n_values) {
+        out->input.n_values = input->n_values;
+        memcpy(out->input.values, input->values, sizeof(out->input.values));
+        add_values(out, input);
+    }
+    out->is_settled = out->is_settled && are_lights_settled(out);
+    return 0;
+}
+
+/* Nothing moves; a frame counts. */
+static int hold(const struct gn_temporal *kept, const struct gn_temporal_input *input,
+                struct gn_temporal **out_temporal)
+{
+    int rc = gn_temporal_complete(kept, input, out_temporal);
+    struct gn_temporal *out = *out_temporal;
+    if (rc < 0)
+        return rc;
+    out->figures = (struct gn_temporal_figures){
+        .verdict = GN_TEMPORAL_HOLD,
+        .n_fading = out->n_lights > 0 ? kept->figures.n_fading : 0,
+    };
     out->n_held++;
-    out->values_share = 0;
-    return out;
+    if (kept->input.n_values == input->n_values)
+        out->values_share = 0;
+    return 0;
 }
 
 int gn_temporal_follow(const struct gn_temporal *kept, const struct gn_temporal_input *input,
                        double tau, struct gn_temporal **out_temporal)
 {
     double dt_ms = kept ? gn_clock_get_ms_between(kept->input.time_ns, input->time_ns) : 0;
-    bool is_same_kind = kept && kept->input.has_lights == input->has_lights;
-    bool is_near = is_same_kind && fabs(dt_ms) <= GN_TEMPORAL_GAP_MS;
-    if (is_near && !(dt_ms > 0) && kept->n_held < GN_TEMPORAL_HOLDS_MAX &&
-        kept->input.n_values == input->n_values) {
-        *out_temporal = hold(kept);
-        return *out_temporal ? 0 : -ENOMEM;
-    }
+    bool is_near = kept && fabs(dt_ms) <= GN_TEMPORAL_GAP_MS;
+    if (is_near && !(dt_ms > 0) && kept->n_held < GN_TEMPORAL_HOLDS_MAX)
+        return hold(kept, input, out_temporal);
     *out_temporal = NULL;
     size_t n = (size_t)input->n_lights + (is_near ? 2 * (size_t)kept->n_lights : 0);
     struct gn_temporal *out = calloc(1, sizeof(*out) + n * sizeof(out->lights[0]));
@@ -428,6 +486,8 @@ int gn_temporal_follow(const struct gn_temporal *kept, const struct gn_temporal_
         return -ENOMEM;
     out->input = *input;
     out->input.lights = NULL;
+    for (int c = 0; c < 3; c++)
+        out->factor[c] = 1;
     int rc = 0;
     if (!is_near || !(dt_ms > 0)) {
         start(input, out);

@@ -18,6 +18,7 @@
 
 #include "proto/attr.h"
 #include "server/light/state.h"
+#include "server/light/temporal_change.h"
 
 /** Longest gap between two frames that is bridged; after a longer one the filter starts anew. */
 #define GN_TEMPORAL_GAP_MS 500.0
@@ -33,8 +34,9 @@ struct gn_temporal_input {
     int n_lights;
     const struct gn_light *lights; // [n_lights] finite; id 0 or seen twice: no light's successor
     double total[3];               // what the lights' irradiance is meant to add up to, or nearly
-    int n_values;                  // [0, GN_TEMPORAL_VALUES_MAX]
-    double values[GN_TEMPORAL_VALUES_MAX]; // linear in the map's radiance
+    double sums[GN_CHANGE_SUMS];   // where the map's light is; they alone set the pace
+    int n_values;                  // [0, GN_TEMPORAL_VALUES_MAX]; 0: left out
+    double values[GN_TEMPORAL_VALUES_MAX]; // R, G, B in turn, linear in the map's radiance
 };
 
 /** One light that is followed. */
@@ -50,8 +52,10 @@ struct gn_temporal {
     struct gn_temporal_input
         input; // of the last frame that it followed; its lights are those below
     double total[3];
+    double sums[GN_CHANGE_SUMS];
     double values[GN_TEMPORAL_VALUES_MAX];
     double values_share; // of the way that the values went to the frame's; 0: held, 1: all of it
+    double factor[3];    // times the frame's: values that were added; else 1
     struct gn_temporal_figures figures;
     int n_held;      // frames in a row whose time did not rise
     bool is_settled; // nothing would change if the same frame came for ever
@@ -61,11 +65,21 @@ struct gn_temporal {
 
 /**
  * One step: a pure function of what was kept (NULL: nothing; starts anew), the frame and tau
- * (s, > 0). Returns 0 or -ENOMEM; *out_temporal is the caller's, freed by free().
+ * (s, > 0). Lights or values that one of both has and the other has not begin or end, and move
+ * nothing of the rest: begun, they are the frame's with the power of the filtered total. Returns 0
+ * or -ENOMEM; *out_temporal is the caller's, freed by free().
  */
 GN_MUST_USE int gn_temporal_follow(const struct gn_temporal *kept,
                                    const struct gn_temporal_input *input, double tau,
                                    struct gn_temporal **out_temporal);
+
+/**
+ * No step: what was kept, with the lights or values of the same frame that were left out and are in
+ * the input now, begun as above; without those that the input has no more. sums are not read.
+ */
+GN_MUST_USE int gn_temporal_complete(const struct gn_temporal *kept,
+                                     const struct gn_temporal_input *input,
+                                     struct gn_temporal **out_temporal);
 
 /**
  * The same frame seen again at a later time: as gn_temporal_follow() with the last frame's lights.

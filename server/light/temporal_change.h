@@ -9,29 +9,35 @@
 
 #include <stdbool.h>
 
+#include "server/light/radiance_map.h"
+
 /** Overlapping round windows over the whole sphere. */
 #define GN_CHANGE_WINDOWS 64
+/** Their sums of luminance, and that of the whole sphere behind them. */
+#define GN_CHANGE_SUMS (GN_CHANGE_WINDOWS + 1)
 
-/** Sums of luminance in each window. Zeroed: dark. A value. */
+/** What has changed. A value. */
 struct gn_change {
-    double before[GN_CHANGE_WINDOWS], after[GN_CHANGE_WINDOWS];
-    double total_before, total_after;
-    double middle[GN_CHANGE_WINDOWS][3]; // unit; set by gn_change_init()
-    bool is_changed[GN_CHANGE_WINDOWS];  // set by gn_change_find()
+    double middle[GN_CHANGE_WINDOWS][3]; // unit
+    bool is_changed[GN_CHANGE_SUMS];
     bool any;
-    double
-        deviation; // largest difference of a window's sums, as a share of the larger; set by find
+    double deviation; // largest difference of a window's sums, as a share of the larger whole
 };
 
-void gn_change_init(struct gn_change *change);
-/** Adds a light's luminance to the sums before, or after. */
-void gn_change_add(struct gn_change *change, bool is_after, const double dir[static 3],
+/** Adds light of that luminance, W/m^2, from a unit direction to the sums. */
+void gn_change_add(double sums[static GN_CHANGE_SUMS], const double dir[static 3],
                    double luminance);
+/**
+ * The sums of a map's light, its fill included. Of the map alone, so that they do not depend on
+ * what else is made of it; in patches of 1/48 of its longer side, W/m^2 of luminance.
+ */
+void gn_change_measure(const struct gn_radiance_map *map, double out_sums[static GN_CHANGE_SUMS]);
 /**
  * A window has changed where the sums differ by more than a factor of 4 and by more than 2 % of all
  * light (of the brighter moment's).
  */
-void gn_change_find(struct gn_change *change);
+void gn_change_find(struct gn_change *change, const double before[static GN_CHANGE_SUMS],
+                    const double after[static GN_CHANGE_SUMS]);
 /** Is the direction in a changed window's middle part? */
 bool gn_change_has(const struct gn_change *change, const double dir[static 3]);
 

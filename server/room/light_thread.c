@@ -439,6 +439,16 @@ static void keep_worked(struct gn_worked_frame **worked, const struct gn_environ
         gn_worked_frame_keep(*worked, job);
 }
 
+/** Puts the completed state in the state's place. */
+static int complete(struct gn_room *room, const struct gn_light_options *options,
+                    struct gn_lighting_state **state, struct gn_error *out_error)
+{
+    struct gn_lighting_state *old = *state;
+    int rc = gn_lighting_state_complete(old, options, room->options.pool, state, out_error);
+    gn_lighting_state_unref(&old);
+    return rc;
+}
+
 /** From one frame to its probe's light; takes the work. decoder: NULL where there is no memory. */
 static void make_light(struct gn_room *room, struct gn_environment_decoder *decoder,
                        struct gn_probe_work *work, struct wants wants)
@@ -455,13 +465,14 @@ static void make_light(struct gn_room *room, struct gn_environment_decoder *deco
     options.previous = previous;
     options.stream = job->session_id;
     bool is_same = work->worked && previous && previous->stream == job->session_id &&
-                   !lacks(previous, wants) &&
                    gn_worked_frame_is_same(work->worked, job, room->options.environment_noise);
     if (is_same) {
         rc = gn_lighting_state_advance(previous, job->frame.sequence, job->frame.capture_time_ns,
                                        &options, &state);
         if (rc < 0)
             (void)gn_error_set(&error, rc, "out of memory");
+        else if (lacks(state, wants))
+            rc = complete(room, &options, &state, &error);
     } else {
         rc = decoder ? gn_environment_decode(decoder, &job->frame, job->payload, &frame, &error)
                      : gn_error_set(&error, -ENOMEM, "out of memory");

@@ -30,6 +30,7 @@ struct house {
     struct gn_room_session *probe, *viewer, *subscriber;
     uint64_t next_id, frame_id, sequence;
     int64_t time_ns;
+    double gain; // of all light
 };
 
 static void write_file(const char *name, const char *text)
@@ -79,11 +80,12 @@ static struct gn_room_session *join(struct house *h, enum gn_msg_role role, bool
     return session;
 }
 
-static void build(struct house *h, enum scene scene, double noise, bool no_shadow)
+static void build_shaded(struct house *h, enum scene scene, double noise, bool no_shadow,
+                         bool by_irradiance)
 {
     char path[64];
     struct gn_error error = {0};
-    *h = (struct house){.time_ns = 1000000000};
+    *h = (struct house){.time_ns = 1000000000, .gain = 1};
     snprintf(path, sizeof(path), "%s/%s", folder, scenes[scene]);
     assert_int_equal(gn_mailbox_create(&h->mailbox), 0);
     const struct gn_room_options options = {
@@ -91,7 +93,8 @@ static void build(struct house *h, enum scene scene, double noise, bool no_shado
         .node = "node",
         .scene_path = path,
         .light = {.smoothing = 0.4},
-        .render = {.no_shadow = no_shadow},
+        .render = {.no_shadow = no_shadow,
+                   .shading = by_irradiance ? GN_SHADING_IRRADIANCE : GN_SHADING_LIGHTS},
         .environment_noise = noise,
         .max_picture_width = WIDTH,
         .max_picture_height = HEIGHT,
@@ -119,6 +122,11 @@ static void build(struct house *h, enum scene scene, double noise, bool no_shado
     assert_int_equal(gn_room_put_camera(h->viewer, &camera, &error), 0);
 }
 
+static void build(struct house *h, enum scene scene, double noise, bool no_shadow)
+{
+    build_shaded(h, scene, noise, no_shadow, false);
+}
+
 static void raze(struct house *h)
 {
     gn_room_leave(&h->subscriber);
@@ -129,7 +137,7 @@ static void raze(struct house *h)
 }
 
 /* A sky that is brighter on one side, with a lamp; noise: each half float up or down by a share. */
-static struct gn_buf *make_pixels(double noise, unsigned seed)
+static struct gn_buf *make_pixels(double gain, double noise, unsigned seed)
 {
     struct gn_buf *pixels;
     assert_int_equal(gn_buf_create((size_t)MAP_WIDTH * MAP_HEIGHT * 6, &pixels), 0);
@@ -139,7 +147,7 @@ static struct gn_buf *make_pixels(double noise, unsigned seed)
         for (int c = 0; c < 3; c++) {
             seed = seed * 1664525u + 1013904223u;
             double sign = seed >> 31 ? 1 : -1;
-            double value = (0.1 + 0.2 * x / MAP_WIDTH + lamp) * (1 + sign * noise);
+            double value = gain * (0.1 + 0.2 * x / MAP_WIDTH + lamp) * (1 + sign * noise);
             uint16_t half = gn_half_from_float((float)value);
             pixels->data[6 * i + 2 * c] = (uint8_t)half;
             pixels->data[6 * i + 2 * c + 1] = (uint8_t)(half >> 8);
@@ -168,7 +176,7 @@ static void send_light(struct house *h, uint64_t sequence, double noise, unsigne
 {
     struct gn_msg_environment_frame frame = make_header();
     struct gn_error error = {0};
-    struct gn_buf *pixels = make_pixels(noise, seed);
+    struct gn_buf *pixels = make_pixels(h->gain, noise, seed);
     frame.sequence = h->sequence = sequence;
     frame.capture_time_ns = h->time_ns += 33333333;
     assert_int_equal(gn_room_put_environment(h->probe, &frame, pixels, &error), 0);
@@ -343,6 +351,47 @@ static void makes_lights_only_for_who_uses_them(void **test)
     raze(&h);
 }
 
+/* Who begins or ceases to want more of the light moves nothing of the picture, in the middle of a
+ * step that is being followed. */
+static void pictures_do_not_show_who_subscribes(void **test)
+{
+    (void)test;
+    static uint8_t alone[WIDTH * HEIGHT * 3], watched[sizeof(alone)], first[sizeof(alone)];
+    for (int shading = 0; shading < 2; shading++) {
+        struct house a, b;
+        build_shaded(&a, DIFFUSE, 0, shading == 1, shading == 1);
+        build_shaded(&b, DIFFUSE, 0, shading == 1, shading == 1);
+        struct house *const houses[] = {&a, &b};
+        for (unsigned i = 0; i < 8; i++) {
+            for (int k = 0; k < 2; k++) {
+                houses[k]->gain = i < 2 ? 0.3 : 0.45;
+                light_up(houses[k], 0, 1);
+            }
+            if (i == 3)
+                b.subscriber = join(&b, GN_MSG_ROLE_VIEWER, true);
+            for (int j = 0; i == 3; j++) { // until all of it is made
+                struct gn_lighting_state *light = gn_room_get_light(b.room);
+                bool is_whole = light->has_sh && light->has_lights;
+                gn_lighting_state_unref(&light);
+                if (is_whole)
+                    break;
+                assert_true(j < 20000);
+                nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+            }
+            if (i == 5)
+                gn_room_leave(&b.subscriber);
+            draw(&a, alone);
+            draw(&b, watched);
+            assert_memory_equal(alone, watched, sizeof(alone));
+            if (i == 2)
+                memcpy(first, alone, sizeof(first));
+        }
+        assert_true(get_difference(first, alone) > 2); // a step it was
+        raze(&a);
+        raze(&b);
+    }
+}
+
 /* A replay that starts again counts from 1: the light of its first run is not what is meant. */
 static void waits_for_the_light_of_the_newest_probe(void **test)
 {
@@ -372,7 +421,7 @@ static void waits_for_no_probe_that_was_refused(void **test)
     struct house h;
     struct gn_error error = {0};
     struct gn_msg_environment_frame frame = make_header();
-    struct gn_buf *pixels = make_pixels(0, 1);
+    struct gn_buf *pixels = make_pixels(1, 0, 1);
     build(&h, DIFFUSE, 0, false);
     light_up(&h, 0.1, 1);
     struct gn_room_session *bad = join(&h, GN_MSG_ROLE_PROBE, false);
@@ -525,6 +574,7 @@ int main(void)
         cmocka_unit_test(leaves_equal_frames_alone),
         cmocka_unit_test(makes_harmonics_only_for_who_uses_them),
         cmocka_unit_test(makes_lights_only_for_who_uses_them),
+        cmocka_unit_test(pictures_do_not_show_who_subscribes),
         cmocka_unit_test(waits_for_the_light_of_the_newest_probe),
         cmocka_unit_test(waits_for_no_probe_that_was_refused),
     };

@@ -358,25 +358,93 @@ static void follows_without_lights_too(void **test)
 {
     (void)test;
     struct gn_temporal *a = NULL, *b = NULL;
+    const double up[3] = {0, 0, 1};
     struct gn_temporal_input input = {.total = {10, 10, 10}, .n_values = 2, .values = {4, 1}};
+    gn_change_add(input.sums, up, 10);
     assert_int_equal(gn_temporal_follow(NULL, &input, play_tau, &a), 0);
     input.time_ns = 20000000;
     input.total[1] = 10.02;
+    gn_change_add(input.sums, up, 0.014);
     assert_int_equal(gn_temporal_follow(a, &input, play_tau, &b), 0);
     assert_near(b->figures.tau_ms, 200, 1e-9);
     assert_near(b->total[1], 10 + 0.02 * (1 - exp(-0.1)), 1e-9);
     free(a);
     input.time_ns = 40000000;
     input.values[1] = 2;
+    gn_change_add(input.sums, up, 1);
     assert_int_equal(gn_temporal_follow(b, &input, play_tau, &a), 0);
     assert_near(a->values[1], 1 + (1 - exp(-0.5)), 1e-9);
     free(b);
     input.time_ns = 60000000;
     input.total[0] = input.total[1] = input.total[2] = 1; // the light goes
+    gn_change_add(input.sums, up, -10);
     assert_int_equal(gn_temporal_follow(a, &input, play_tau, &b), 0);
     assert_true(b->total[0] == 1 && b->values[1] == 2);
     free(a);
     free(b);
+}
+
+/* Two frames are one to the bit in what both keep. */
+static void assert_same_light(const struct gn_temporal *a, const struct gn_temporal *b,
+                              bool has_lights)
+{
+    assert_memory_equal(a->sums, b->sums, sizeof(a->sums));
+    assert_int_equal(a->n_held, b->n_held);
+    assert_true(a->figures.alpha == b->figures.alpha);
+    if (has_lights) {
+        assert_memory_equal(a->total, b->total, sizeof(a->total));
+        assert_int_equal(a->n_lights, b->n_lights);
+        assert_memory_equal(a->lights, b->lights, (size_t)a->n_lights * sizeof(a->lights[0]));
+    } else {
+        assert_memory_equal(a->values, b->values, sizeof(a->values));
+        assert_true(a->values_share == b->values_share);
+    }
+}
+
+/* One stream is made whole all the time, one has lights or values alone but for some frames: in
+ * the middle of a step, by a frame or after it. What it always has is the same to the bit. */
+static void knows_nothing_of_what_is_left_out(void **test)
+{
+    (void)test;
+    for (int k = 0; k < 4; k++) {
+        bool has_lights = k % 2, is_between = k / 2;
+        struct play p;
+        struct gn_temporal *part = NULL, *next;
+        begin(&p);
+        for (int i = 0; i < 24; i++) {
+            bool is_whole = i >= 8 && i < 14;
+            p.values[0] = 40 + (i > 5 ? 9 : 0);
+            p.values[1] = 0.1 * i;
+            p.lights[1].irradiance[i % 3] = 10 + (float)(i > 5) * 8 + 0.01f * (float)i;
+            p.lights[2].dir_world[2] += 0.01f;
+            if (i == 11)
+                put_light(&p, 9, 1.5, -0.6, 500); // is there at once
+            show(&p, i % 7 == 6 ? 0 : 1.0 / 30);
+            struct gn_temporal_input whole = get_input(&p), input = whole;
+            bool asks = is_whole && !(is_between && i == 8);
+            input.has_lights = has_lights || asks;
+            input.n_lights = input.has_lights ? p.n : 0;
+            input.n_values = !has_lights || asks ? 3 : 0;
+            assert_int_equal(gn_temporal_follow(part, &input, p.tau, &next), 0);
+            free(part);
+            part = next;
+            if (is_between && i == 8) {
+                assert_int_equal(gn_temporal_complete(part, &whole, &next), 0);
+                free(part);
+                part = next;
+            }
+            if (is_whole) {
+                double sum = 0;
+                for (int j = 0; j < part->n_lights; j++)
+                    sum += part->lights[j].irradiance[1];
+                assert_near(sum, part->total[1], 1e-5 * sum);
+                assert_int_equal(part->input.n_values, 3);
+            }
+            assert_same_light(p.now, part, has_lights);
+        }
+        free(part);
+        end(&p);
+    }
 }
 
 int main(void)
@@ -397,6 +465,7 @@ int main(void)
         cmocka_unit_test(settles_to_the_bit),
         cmocka_unit_test(stays_black_where_it_is_black),
         cmocka_unit_test(follows_without_lights_too),
+        cmocka_unit_test(knows_nothing_of_what_is_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
