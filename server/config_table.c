@@ -101,10 +101,12 @@ static const struct gn_option table[] = {
      .help = "Into how many lights the scene's emissive meshes are cut together; one that faces "
              "several ways has one for each of up to 6 in any case."},
     {ROOM, .key = "environment-noise", .type = GN_OPTION_DOUBLE, .min = 0, .max = 0.1,
-     .default_value = "0.004",
+     .default_value = "0",
      .help = "An environment frame that differs from the last one worked on by at most this share "
-             "of each texel's light counts as the same, and is not worked on. The default keeps "
-             "results within 1/255. 0: only frames that are the same to the byte."},
+             "of each texel's light counts as the same, and is not worked on. 0: only frames that "
+             "are the same to the byte, so that no result depends on it. More spares work under a "
+             "sensor's noise; results may then be off by some codes where a method would have "
+             "divided its lights anew."},
     {ROOM, .key = "ground-albedo", .type = GN_OPTION_DOUBLE, .min = 0, .max = 1,
      .default_value = "0.2",
      .help = "Reflectance of the ground that fills the half of the sphere that a fisheye does not "

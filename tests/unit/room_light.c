@@ -565,12 +565,31 @@ static void compares_floats_by_share(void **test)
     }
 }
 
+/* Its codes are too coarse for a share: one of them is 0.4 to 100 % of the light. */
+static void compares_bytes_of_rgb8(void **test)
+{
+    (void)test;
+    size_t n = (size_t)MAP_WIDTH * MAP_HEIGHT * 3;
+    struct gn_worked_frame worked = {0};
+    struct gn_environment_job old = make_job(GN_MSG_PIXEL_FORMAT_RGB8, n);
+    struct gn_environment_job now = make_job(GN_MSG_PIXEL_FORMAT_RGB8, n);
+    old.payload->data[100] = now.payload->data[100] = 254;
+    gn_worked_frame_keep(&worked, &old);
+    assert_true(gn_worked_frame_is_same(&worked, &now, 0));
+    now.payload->data[100] = 255;
+    assert_false(gn_worked_frame_is_same(&worked, &now, 0.1));
+    gn_worked_frame_finish(&worked);
+    gn_buf_unref(&old.payload);
+    gn_buf_unref(&now.payload);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(knows_how_far_a_code_may_be_off),
         cmocka_unit_test(forgets_the_bounds_of_another_table),
         cmocka_unit_test(compares_floats_by_share),
+        cmocka_unit_test(compares_bytes_of_rgb8),
         cmocka_unit_test(leaves_equal_frames_alone),
         cmocka_unit_test(makes_harmonics_only_for_who_uses_them),
         cmocka_unit_test(makes_lights_only_for_who_uses_them),
