@@ -12,6 +12,9 @@ static const char *const names[GN_RESPONSE_COUNT] = {
     [GN_RESPONSE_LOG] = "log",       [GN_RESPONSE_TABLE] = "table",
 };
 
+/* Of a scale and of a matrix times it: the products with any float stay in double's range. */
+static const double gain_max = 1e30;
+
 static const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 const char *gn_response_get_name(enum gn_response_type type)
@@ -80,11 +83,14 @@ static const char *check(const struct gn_response *r)
         !(isfinite(r->log_a) && isfinite(r->log_b) && r->log_b > 0 && isfinite(r->log_c) &&
           r->log_c >= 0 && (1 - r->log_a) / r->log_b < 80))
         return "a log response needs finite a, b > 0, c >= 0, and (1 - a) / b below 80";
-    if (!(r->scale >= 0 && isfinite(r->scale)))
-        return "a response's scale must be finite and not negative";
+    if (!(r->scale >= 0 && r->scale <= gain_max))
+        return "a response's scale must lie in [0, 1e30]";
     double inverse[9];
     if (!is_all_zero(r->to_rec709) && !invert_matrix(r->to_rec709, inverse))
         return "a response's matrix to Rec.709 must be finite and invertible";
+    for (int i = 0; i < 9; i++)
+        if (!(fabs(r->to_rec709[i]) * (r->scale == 0 ? 1 : r->scale) <= gain_max))
+            return "a response's matrix times its scale must lie in [-1e30, 1e30]";
     return r->type == GN_RESPONSE_TABLE ? check_table(r) : NULL;
 }
 

@@ -30,7 +30,7 @@ struct gn_response {
     const float *table;  // [table_size], for TABLE; borrowed, may be NULL otherwise
     int table_size;      // [2, 4096]
     double to_rec709[9]; // row-major 3x3, linear device RGB to linear Rec.709; all zero: identity
-    double scale;        // radiance per linear unit, >= 0; 0: 1
+    double scale;        // radiance per linear unit, [0, 1e30]; 0: 1; times to_rec709 as well
 };
 
 /** Checks ranges. Returns 0, or -EINVAL and a sentence (static string) in *out_reason (may be

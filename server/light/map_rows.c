@@ -2,6 +2,7 @@
 /* SPDX-License-Identifier: ISC */
 #include "server/light/map_rows.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -224,15 +225,16 @@ static void calibrate(const struct gn_map_reader *r, const float *gain, float *r
 {
     for (int i = 0; i < n; i++, rgb += 3) {
         double v[3], factor = gain ? (double)gain[i] : 1;
-        for (int c = 0; c < 3; c++)
-            v[c] =
-                (double)(r->has_curve ? gn_response_decode(&r->frame->response, rgb[c]) : rgb[c]);
+        for (int c = 0; c < 3; c++) // a curve may leave float's range, and a matrix has zeros
+            v[c] = r->has_curve ? fmin((double)gn_response_decode(&r->frame->response, rgb[c]),
+                                       (double)FLT_MAX)
+                                : (double)rgb[c];
         if (r->has_matrix)
             row->n_out_of_gamut += multiply(r->matrix, v);
         else
             factor *= r->scale;
         for (int c = 0; c < 3; c++) // beyond float's range it is infinite, and capped
-            rgb[c] = (float)fmin(v[c] * factor, 2 * (double)GN_RADIANCE_MAX);
+            rgb[c] = v[c] > 0 ? (float)fmin(v[c] * factor, 2 * (double)GN_RADIANCE_MAX) : 0;
     }
 }
 

@@ -311,6 +311,42 @@ static void vignetting_is_divided_out(void **unused)
     light_fixture_finish(&f);
 }
 
+/* The largest scale behind a lens that darkens leaves black black. */
+static void black_stays_black_under_any_scale(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 32, 32), 0);
+    f.frame.codes = &f.image;
+    f.frame.projection.vignetting[0] = -0.9;
+    f.frame.response.scale = 1e30;
+    struct gn_radiance_map *map = make_map(&f, NULL);
+    assert_true(map->figures.max_luminance == 0);
+    gn_radiance_map_unref(&map);
+    struct gn_error error = {0};
+    f.frame.response.scale = 1.7e308;
+    assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), -EINVAL);
+    assert_non_null(strstr(error.text, "scale"));
+    light_fixture_finish(&f);
+}
+
+/* A code whose value leaves float's range, behind a matrix: only its own channel is bright. */
+static void a_red_texel_stays_red_beyond_float(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 32, 16), 0);
+    f.frame.response = (struct gn_response){
+        .type = GN_RESPONSE_GAMMA, .gamma = 10, .to_rec709 = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    f.frame.codes = &f.image;
+    gn_image_at(&f.image, 7, 5)[0] = 1e5f; // ^10
+    struct gn_radiance_map *map = make_map(&f, NULL);
+    const float *texel = gn_image_at(&map->radiance, 7, 5);
+    assert_true(texel[0] == GN_RADIANCE_MAX && texel[1] == 0 && texel[2] == 0);
+    gn_radiance_map_unref(&map);
+    light_fixture_finish(&f);
+}
+
 static void every_projection_covers_its_sphere(void **unused)
 {
     (void)unused;
@@ -490,6 +526,8 @@ int main(void)
         cmocka_unit_test(a_code_above_the_format_is_refused),
         cmocka_unit_test(figures_are_sums_over_the_map),
         cmocka_unit_test(vignetting_is_divided_out),
+        cmocka_unit_test(black_stays_black_under_any_scale),
+        cmocka_unit_test(a_red_texel_stays_red_beyond_float),
         cmocka_unit_test(every_projection_covers_its_sphere),
         cmocka_unit_test(texel_centres_look_up_themselves),
         cmocka_unit_test(directions_look_up_without_black_or_seam),

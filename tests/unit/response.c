@@ -118,6 +118,9 @@ static void test_refusals(void **state)
         {{.type = GN_RESPONSE_TABLE, .table = bad, .table_size = 2}, "finite"},
         {{.scale = -1}, "scale"},
         {{.scale = INFINITY}, "scale"},
+        {{.scale = 1.1e30}, "scale"},
+        {{.to_rec709 = {1, 0, 0, 0, 1.1e30, 0, 0, 0, 1}}, "matrix times its scale"},
+        {{.to_rec709 = {1e15, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1e16}, "matrix times its scale"},
         {{.to_rec709 = {1, 1, 1, 1, 1, 1, 0, 0, 1}}, "matrix"},
         {{.to_rec709 = {1, 0, 0, 0, NAN, 0, 0, 0, 1}}, "matrix"},
     };
