@@ -158,8 +158,9 @@ bool gn_light_is_count_kept(double count_ratio)
 double gn_light_get_share(const struct gn_light_input *input)
 {
     static const double time_constant_s = 1;
-    int64_t ns = input->map->capture_time_ns - input->previous->map->capture_time_ns;
-    return ns > 0 ? -expm1(-(double)ns / (double)GN_NS_PER_S / time_constant_s) : 0;
+    double ms =
+        gn_clock_get_ms_between(input->previous->map->capture_time_ns, input->map->capture_time_ns);
+    return ms > 0 ? -expm1(-1e-3 * ms / time_constant_s) : 0;
 }
 
 double gn_light_follow(const struct gn_light_input *input, double kept, double fresh,

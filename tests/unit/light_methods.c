@@ -14,7 +14,9 @@
 #include <cmocka.h>
 
 #include "common/pool.h"
+#include "server/light/lights.h"
 #include "server/light/luminance.h"
+#include "server/light/method.h"
 #include "server/light/state.h"
 #include "tests/light_fixture.h"
 
@@ -395,6 +397,19 @@ static void inversion_keeps_identities(void **unused)
     light_fixture_finish(&f);
 }
 
+/* Times that a client made up, as far apart as they can be: all of the way, and none back. */
+static void any_times_may_be_given(void **unused)
+{
+    (void)unused;
+    struct gn_radiance_map first = {.capture_time_ns = INT64_MIN};
+    struct gn_radiance_map last = {.capture_time_ns = INT64_MAX};
+    struct gn_lighting_state before = {.map = &first}, after = {.map = &last};
+    const struct gn_light_input on = {.map = &last, .previous = &before};
+    const struct gn_light_input back = {.map = &first, .previous = &after};
+    assert_true(gn_light_get_share(&on) == 1);
+    assert_true(gn_light_get_share(&back) == 0);
+}
+
 static void two_lamps(const double dir[static 3], float out[static 3])
 {
     float v = 0.01f;
@@ -434,6 +449,7 @@ int main(void)
         cmocka_unit_test(quadtree_leaves_the_others_where_they_were),
         cmocka_unit_test(quadtree_is_calm_in_noise),
         cmocka_unit_test(quadtree_comes_back_to_its_number),
+        cmocka_unit_test(any_times_may_be_given),
         cmocka_unit_test(inversion_spreads_evenly),
         cmocka_unit_test(inversion_keeps_identities),
     };
