@@ -204,7 +204,7 @@ static void follow(struct step *s, const struct gn_light *raw, const struct gn_t
         memcpy(light.irradiance, kept->irradiance, sizeof(light.irradiance));
         memcpy(light.moment, kept->moment, sizeof(light.moment));
         for (int k = 0; k < 3; k++) {
-            (void)approach(&light.irradiance[k], end.irradiance[k], s->alpha, end.irradiance[k]);
+            (void)approach(&light.irradiance[k], end.irradiance[k], s->alpha, scale);
             (void)approach(&light.moment[k], end.moment[k], s->alpha, scale);
         }
     } else {

@@ -335,6 +335,21 @@ static void settles_to_the_bit(void **test)
     end(&p);
 }
 
+/* A light that loses one channel: it is gone within seconds, not a thousand denormals later. */
+static void settles_where_a_channel_goes_out(void **test)
+{
+    (void)test;
+    struct play p;
+    begin(&p);
+    show(&p, 0.02);
+    p.lights[0].irradiance[2] = 0;
+    for (int i = 0; i < 600 && (i == 0 || !p.now->is_settled); i++)
+        show(&p, 1.0 / 60);
+    assert_true(p.now->is_settled);
+    assert_true(find(&p, 1)->irradiance[2] == 0);
+    end(&p);
+}
+
 static void stays_black_where_it_is_black(void **test)
 {
     (void)test;
@@ -463,6 +478,7 @@ int main(void)
         cmocka_unit_test(holds_when_time_stands_still),
         cmocka_unit_test(starts_anew_after_a_gap),
         cmocka_unit_test(settles_to_the_bit),
+        cmocka_unit_test(settles_where_a_channel_goes_out),
         cmocka_unit_test(stays_black_where_it_is_black),
         cmocka_unit_test(follows_without_lights_too),
         cmocka_unit_test(knows_nothing_of_what_is_left_out),
