@@ -11,6 +11,9 @@ import statistics
 
 import tables
 
+# An answer that only settings too near to the truth to be judged could give.
+UNKNOWN = math.nan
+
 MEANS = ["lights", "rmse", "flip", "relmse", "relmse_trimmed", "ms_light", "ms_frame", "rays"]
 
 
@@ -102,10 +105,14 @@ class Curves:
                            max(r["ms_light"] + r["ms_frame"] for r in most), points[-1][2]))
         return points
 
-    def mean_error_at_time(self, method, ms):
-        """Geometric mean over all pairs; None unless it has a setting for each."""
+    def errors_at_time(self, method, ms):
+        """Of all pairs; None unless it has a setting for each."""
         errors = [look_up(self.by_time(method, p), ms) for p in self.pairs]
-        return None if None in errors else geometric_mean(errors)
+        return None if None in errors else errors
+
+    def mean_error_at_time(self, method, ms):
+        errors = self.errors_at_time(method, ms)
+        return errors and geometric_mean(errors)
 
     def error_ratios(self, method, base, ms):
         pairs = [(look_up(self.by_time(base, p), ms), look_up(self.by_time(method, p), ms))
@@ -120,9 +127,21 @@ class Curves:
                 sum(1 for b, m in times if b and not m))
 
     def lights_for(self, method, map_name, error):
-        """Geometric mean over the scenes; None where one of them never gets there."""
-        needed = [find(self.by_lights(method, p), error) for p in self.pairs if p[1] == map_name]
-        return None if None in needed else geometric_mean(needed)
+        """Geometric mean over the scenes; None where one of them never gets there; UNKNOWN where one
+        may have, by a setting that is not judged."""
+        pairs = [p for p in self.pairs if p[1] == map_name]
+        needed = [find(self.by_lights(method, p), error) for p in pairs]
+        missing = [p for p, n in zip(pairs, needed) if n is None]
+        if missing:
+            return UNKNOWN if all(self.may_reach(method, p, error) for p in missing) else None
+        return geometric_mean(needed)
+
+    def may_reach(self, method, pair, error):
+        """Whether a setting that is not judged may have no more than that error."""
+        names = tables.BASELINE if method == self.base else (method,)
+        bound = min(self.nearest[pair], error + self.nearest[pair] / 10)
+        return any(r["method"] in names and (r["scene"], r["map"]) == pair and r["rmse"] < bound
+                   for r in self.all)
 
     def same_lights_ratios(self, method, base, map_name, n):
         """The base's error at n lights over the method's."""

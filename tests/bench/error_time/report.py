@@ -2,20 +2,22 @@
 # SPDX-License-Identifier: ISC
 """Makes the page and its plots of what error_time measured. Nothing in them is written by hand.
 
-usage: report.py FOLDER [DOCS]
+usage: report.py FOLDER GNOMOND [DOCS]
 
-FOLDER holds the tables of error_time; plots.svg and plots.png files and page.md go there. With DOCS (the
-tree's docs folder) the page goes to DOCS/error.md and the SVG plots beside it. Needs gnuplot.
+FOLDER holds the tables of error_time; plots.svg and plots.png files and page.md go there. GNOMOND is the
+daemon's program: it is asked for its default method. With DOCS (the tree's docs folder) the page goes to
+DOCS/error.md and the SVG plots beside it. Needs gnuplot.
 """
 import math
 import os
 import re
 import shutil
+import statistics
 import subprocess
 import sys
 
 import tables
-from curves import Curves, geometric_mean
+from curves import UNKNOWN, Curves, geometric_mean
 
 BUDGETS_MS = [16, 24, 32, 48, 64, 128]
 LEVELS = [0.05, 0.02, 0.01]
@@ -40,6 +42,15 @@ def ratio(value):
     return "-" if value is None else f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
+def quartiles(values):
+    first, _, third = statistics.quantiles(values, n=4, method="inclusive")
+    return first, third
+
+
+def spread(pair):
+    return f"{number(pair[0])} to {number(pair[1])}"
+
+
 def front_table(curves):
     rows = []
     for budget in BUDGETS_MS:
@@ -51,9 +62,10 @@ def front_table(curves):
             continue
         second = ranked[1] if len(ranked) > 1 else None
         best_error, best = ranked[0]
-        rows.append([f"{budget}", f"**{best}**", number(best_error),
+        rows.append([f"{budget}", f"**{best}**", 
+                     f"{number(best_error)} ({spread(quartiles(curves.errors_at_time(best, budget)))})",
                      f"{second[1]}, {number(second[0])}" if second else "-", number(base)])
-    return table(["ms", "lowest error", "RMSE", "second", BASE], rows)
+    return table(["ms", "lowest error", "RMSE (quartiles)", "second", BASE], rows)
 
 
 def equal_time_table(curves):
@@ -89,7 +101,7 @@ def lights_table(curves):
         cells = []
         for map_name in curves.maps:
             needed = [curves.lights_for(method, map_name, level) for level in LEVELS]
-            cells.append(" / ".join("-" if n is None else f"{n:.0f}" for n in needed))
+            cells.append(" / ".join("-" if n is None else "?" if n is UNKNOWN else f"{n:.0f}" for n in needed))
         rows.append([method] + cells)
     return table(["method"] + curves.maps, rows)
 
@@ -166,27 +178,99 @@ def reference_table(curves, reference):
     return table(["map", "scene", "reference within", "settings too near to judge"], rows)
 
 
-def get_default(curves, stream):
-    """What the daemon takes, and whether the front says so."""
-    here = os.path.dirname(os.path.abspath(__file__))
-    with open(os.path.join(here, "../../../deploy/gnomond.conf.example"), encoding="utf-8") as f:
-        text = f.read()
-    method = re.search(r"^#light-method = (\S+)$", text, re.M)[1]
-    n = int(re.search(r"^#lights = (\d+)$", text, re.M)[1])
-    row = curves.mean_row(method, n)
-    ms = row["ms_light"] + row["ms_frame"]
-    ranked = sorted((error, m) for m in curves.methods
-                    if (error := curves.mean_error_at_time(m, ms)) is not None)
-    flicker = {r["method"]: r["flicker"] for r in stream if r["smoothing"] > 0}
-    bound = 2 * min(flicker.values())
-    steady = [m for _, m in ranked if flicker[m] <= bound]
-    if method != steady[0]:
-        print(f"report: the default is {method}; the front says {steady[0]}", file=sys.stderr)
-    others = ", ".join(f"{m} {number(error)} ({number(flicker[m])})" for error, m in ranked)
-    return (f"In the {ms:.0f} ms that {method} with {n} lights takes here, the methods' mean RMSE, and in\n"
-            f"parentheses their flicker with the daemon's filter (below): {others}.\n"
-            f"A daemon shows streams: of the methods that flicker at most twice as much as the steadiest, the\n"
-            f"least error has **{steady[0]}**. The daemon's default is **{method}** with {n} lights.")
+def read_default(gnomond):
+    """(method, lights) that the daemon takes where its configuration names none."""
+    text = subprocess.run([gnomond, "--print-config"], capture_output=True, text=True,
+                          check=True).stdout
+    return (re.search(r"^#?light-method = (\S+)$", text, re.M)[1],
+            int(re.search(r"^#?lights = (\d+)$", text, re.M)[1]))
+
+
+def rank(curves, stream, default, ms):
+    """Methods by mean error within that time, with what their light does in a stream."""
+    filtered = {r["method"]: r for r in stream if r["smoothing"] > 0}
+    ranked = []
+    for method in curves.methods:
+        errors = curves.errors_at_time(method, ms)
+        if errors is None:
+            continue
+        ratios = curves.error_ratios(default, method, ms)  # of the method's over the default's
+        ranked.append({"method": method, "error": geometric_mean(errors), "quartiles": quartiles(errors),
+                       "ratio": geometric_mean(ratios), "ratios": quartiles(ratios),
+                       "wins": sum(r < 1 for r in ratios), "flicker": filtered[method]["flicker"],
+                       "frames": filtered[method]["response_frames"]})
+    return sorted(ranked, key=lambda r: r["error"])
+
+
+def is_on_front(row, ranked):
+    """No other has less error and less flicker and answers as soon."""
+    return not any(o["error"] < row["error"] and o["flicker"] < row["flicker"]
+                   and o["frames"] <= row["frames"] for o in ranked)
+
+
+def find_knee(ranked):
+    """Of the quickest to answer, the least product: error / a costs flicker * a or more."""
+    quickest = min(r["frames"] for r in ranked)
+    return min((r for r in ranked if r["frames"] == quickest),
+               key=lambda r: r["error"] * r["flicker"])
+
+
+def choice_table(ranked, n_pairs):
+    knee = find_knee(ranked)
+    rows = []
+    for r in ranked:
+        name = r["method"] + (" (front)" if is_on_front(r, ranked) else "")
+        rows.append([f"**{name}**" if r is knee else name,
+                     f"{number(r['error'])} ({spread(r['quartiles'])})",
+                     f"{r['ratio']:.2f} ({r['ratios'][0]:.2f} to {r['ratios'][1]:.2f})",
+                     f"{r['wins']} of {n_pairs}", number(r["flicker"], 3), f"{r['frames']:.0f}",
+                     number(r["error"] * r["flicker"], 3)])
+    return table(["method", "RMSE (quartiles)", "over the default's", "less than it in", "flicker F",
+                  "frames to 90 %", "RMSE · F"], rows)
+
+
+def compare(row, own):
+    """What a method's error is beside the default's, in words."""
+    if row is own:
+        return "is the default itself"
+    low, high = row["ratios"]
+    text = f"has {row['ratio']:.2f} times the default's error (quartiles {low:.2f} to {high:.2f}"
+    return text + (": a tie within the spread)" if low <= 1 <= high else ")")
+
+
+def say_choice(curves, ranked, default, n):
+    own = next(r for r in ranked if r["method"] == default)
+    first, knee = ranked[0], find_knee(ranked)
+    lines = [f"- By error alone **{first['method']}** leads: it {compare(first, own)} and F = "
+             f"{number(first['flicker'], 3)}. For single pictures (`gnomon-render`), where nothing can "
+             "flicker, that or the table above is the one to go by.",
+             f"- By the rule **{knee['method']}** leads: it {compare(knee, own)} and F = "
+             f"{number(knee['flicker'], 3)}."]
+    steady = ", ".join(r["method"] for r in ranked if r["flicker"] < 1) or "none"
+    row, base = curves.mean_row(default, n), curves.mean_row(BASE, n)
+    lines.append(f"- The daemon's default is **{default}** with {n} lights, F = {number(own['flicker'], 3)}. A "
+                 f"picture that stands still has 1; below that: {steady}. The default has its lights in "
+                 f"{number(row['ms_light'])} ms, the paper's partition in {number(base['ms_light'])}.")
+    if knee is not own:
+        rival = curves.mean_row(knee["method"], n)
+        lines.append(f"- So the default is not what the rule names. {knee['method']} flickers "
+                     f"{own['flicker'] / knee['flicker']:.2f} times less than it, on one stream, for which there is "
+                     f"no spread, and has its lights in {number(rival['ms_light'])} ms. The default is the paper's kind "
+                     "of method, regions; whoever wants the steadier one sets "
+                     f"`light-method = {knee['method']}`.")
+    times = [(r["iqr_light"] + r["iqr_frame"]) / (r["ms_light"] + r["ms_frame"]) for r in curves.rows]
+    lines.append(f"- The repeats of a time lie {100 * statistics.median(times):.0f} % of it apart (interquartile, median of all "
+                 "settings); errors are the same bits each time.")
+    return lines
+
+
+def say_requirement(curves, reference):
+    missed = [(r["map"], r["scene"], curves.count_too_near(r["scene"], r["map"])) for r in reference]
+    total = len(missed)
+    missed = [f"{m}/{s} ({n} settings)" for m, s, n in missed if n]
+    text = ("Required is that this be under a tenth of the smallest error measured. That is met on "
+            f"{total - len(missed)} of {total} pairs")
+    return text + (f" and **missed** on {', '.join(missed)}." if missed else ".")
 
 
 def get_machine():
@@ -279,10 +363,15 @@ def draw_all(folder, curves, stream):
     draw(folder, "error-flicker", body, (640, 420))
 
 
-def make_page(folder, curves):
+def make_page(folder, gnomond, curves):
     harmonics = tables.read(folder, "irradiance.csv")
     stream = tables.read(folder, "stream.csv")
     run = tables.read(folder, "run.csv")[0]
+    reference = tables.read(folder, "reference.csv")
+    default, n = read_default(gnomond)
+    row = curves.mean_row(default, n)
+    ms = row["ms_light"] + row["ms_frame"]
+    ranked = rank(curves, stream, default, ms)
     draw_all(folder, curves, stream)
     template = os.path.join(os.path.dirname(os.path.abspath(__file__)), "page.md.in")
     with open(template, encoding="utf-8") as f:
@@ -292,11 +381,14 @@ def make_page(folder, curves):
         "load": f"{run['load']:.0f}",
         "size": f"{run['width']:.0f} x {run['height']:.0f}", "repeats": f"{run['repeats']:.0f}",
         "maps": ", ".join(curves.maps), "n_pairs": f"{len(curves.pairs)}",
-        "default": get_default(curves, stream), "front": front_table(curves), "equal_time": equal_time_table(curves),
+        "default": f"{default} with {n} lights", "default_ms": f"{ms:.0f}",
+        "choice": choice_table(ranked, len(curves.pairs)), "verdict": say_choice(curves, ranked, default, n),
+        "front": front_table(curves), "equal_time": equal_time_table(curves),
         "equal_error": equal_error_table(curves), "lights": lights_table(curves),
         "same_lights": same_lights_table(curves), "literal": literal_table(curves), "still": still_table(curves, 64),
         "irradiance": irradiance_tables(curves, harmonics), "stream": stream_table(stream),
-        "reference": reference_table(curves, tables.read(folder, "reference.csv")),
+        "reference": reference_table(curves, reference),
+        "requirement": say_requirement(curves, reference),
     }
     for key, value in fields.items():
         page = page.replace(f"@{key}@", "\n".join(value) if isinstance(value, list) else value)
@@ -304,18 +396,18 @@ def make_page(folder, curves):
 
 
 def main():
-    if len(sys.argv) not in (2, 3):
+    if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
     folder = sys.argv[1]
     curves = Curves(tables.read(folder, "error.csv"), tables.read(folder, "reference.csv"), BASE)
-    page = make_page(folder, curves)
+    page = make_page(folder, sys.argv[2], curves)
     with open(os.path.join(folder, "page.md"), "w", encoding="utf-8") as f:
         f.write(page)
-    if sys.argv[2:]:
-        shutil.copyfile(os.path.join(folder, "page.md"), os.path.join(sys.argv[2], "error.md"))
+    if sys.argv[3:]:
+        shutil.copyfile(os.path.join(folder, "page.md"), os.path.join(sys.argv[3], "error.md"))
         for name in ("error-time", "error-lights", "error-flicker"):
             shutil.copyfile(os.path.join(folder, f"{name}.svg"),
-                            os.path.join(sys.argv[2], f"{name}.svg"))
+                            os.path.join(sys.argv[3], f"{name}.svg"))
 
 
 main()
