@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "server/light/sh.h"
+#include "server/light/vec4.h"
 
 /** The harmonics are polynomials of the direction times these. */
 extern const double gn_sh_factor[GN_SH_MAX];
@@ -46,17 +47,8 @@ extern const double gn_sh_factor[GN_SH_MAX];
         (p)[24] = (p)[15] * (x) - (p)[9] * (y);                                                    \
     } while (0)
 
-/** Four floats that are worked on at once; the language's operators work lane by lane. */
-typedef float gn_sh_vec __attribute__((vector_size(16)));
 /** Vectors that are summed in float before the sum goes to double. */
 enum { GN_SH_LANES = 4, GN_SH_BLOCK = 16 };
-
-static inline gn_sh_vec gn_sh_load(const float *at)
-{
-    gn_sh_vec v;
-    memcpy(&v, at, sizeof(v));
-    return v;
-}
 
 /** Integrals of light times the polynomials, in the probe's axes. */
 struct gn_sh_sums {

@@ -10,7 +10,7 @@
 
 #include "server/light/sh_internal.h"
 
-typedef gn_sh_vec vec;
+typedef gn_vec4 vec;
 
 enum { LANES = GN_SH_LANES, TRIPLE = 3 * GN_SH_LANES, CHUNK = GN_SH_BLOCK * TRIPLE };
 
@@ -63,8 +63,8 @@ static void add_even(const vec *light, const float *cosine, const float *sine, i
     for (int i = 0; i < n; i += 3)
         for (int j = 0; j < 3; j++) {
             vec l = light[i + j];
-            a[j] += l * gn_sh_load(cosine + LANES * (i + j));
-            b[j] += l * gn_sh_load(sine + LANES * (i + j));
+            a[j] += l * gn_vec4_load(cosine + LANES * (i + j));
+            b[j] += l * gn_vec4_load(sine + LANES * (i + j));
         }
     add_to_wave(a, wave[0]);
     add_to_wave(b, wave[1]);
@@ -77,7 +77,8 @@ static void add_odd(const vec *p, const vec *q, const float *cosine, const float
     vec a[3] = {{0}}, b[3] = {{0}};
     for (int i = 0; i < n; i += 3)
         for (int j = 0; j < 3; j++) {
-            vec c = gn_sh_load(cosine + LANES * (i + j)), s = gn_sh_load(sine + LANES * (i + j));
+            vec c = gn_vec4_load(cosine + LANES * (i + j)),
+                s = gn_vec4_load(sine + LANES * (i + j));
             a[j] += p[i + j] * c + q[i + j] * s;
             b[j] += p[i + j] * s - q[i + j] * c;
         }
@@ -97,8 +98,8 @@ static void sum_folded_row(const float *row, int width, int order, const float *
         for (int i = 0; i < n; i += 3)
             for (int j = i; j < i + 3; j++) {
                 const float *at = row + start + LANES * j;
-                vec l0 = gn_sh_load(at), l1 = gn_sh_load(at + quarter);
-                vec l2 = gn_sh_load(at + 2 * quarter), l3 = gn_sh_load(at + 3 * quarter);
+                vec l0 = gn_vec4_load(at), l1 = gn_vec4_load(at + quarter);
+                vec l2 = gn_vec4_load(at + 2 * quarter), l3 = gn_vec4_load(at + 3 * quarter);
                 p[j] = l0 - l2;
                 q[j] = l1 - l3;
                 minus_q[j] = l3 - l1;

@@ -11,7 +11,7 @@
 #include "server/light/map_table.h"
 #include "server/light/sh_internal.h"
 
-typedef gn_sh_vec vec;
+typedef gn_vec4 vec;
 
 enum {
     LANES = GN_SH_LANES,
@@ -33,17 +33,6 @@ struct block {
     vec light[3][BLOCK];
 };
 
-/* Four vectors [3] one after the other, as x, y and z. */
-static void split(const float *at, vec out[static 3])
-{
-    vec a = gn_sh_load(at), b = gn_sh_load(at + 4), c = gn_sh_load(at + 8);
-    vec t = __builtin_shufflevector(a, b, 1, 2, 4, 5),
-        u = __builtin_shufflevector(b, c, 2, 3, 5, 6);
-    out[0] = __builtin_shufflevector(a, u, 0, 3, 4, 6);
-    out[1] = __builtin_shufflevector(t, u, 0, 2, 5, 7);
-    out[2] = __builtin_shufflevector(t, c, 1, 3, 4, 7);
-}
-
 /*
  * Four texels: their solid angles, directions and light. The mean of a harmonic of band l over a
  * small texel of solid angle w is (1 - l(l+1) w / 24) of its value in the middle: the first term of
@@ -52,12 +41,12 @@ static void split(const float *at, vec out[static 3])
 static void add_texels(const float *solid_angle, const float *direction, const float *light,
                        int order, struct block *block)
 {
-    const vec w = gn_sh_load(solid_angle), one = {1, 1, 1, 1};
+    const vec w = gn_vec4_load(solid_angle), one = {1, 1, 1, 1};
     if (!(w[0] + w[1] + w[2] + w[3] > 0))
         return;
     vec d[3], rgb[3], p[GN_SH_MAX];
-    split(direction, d);
-    split(light, rgb);
+    gn_vec4_split(direction, d);
+    gn_vec4_split(light, rgb);
     GN_SH_POLYNOMIALS_2(p, one, d[0], d[1], d[2]);
     if (order > 2)
         GN_SH_POLYNOMIALS_4(p, d[0], d[1], d[2]);
