@@ -53,15 +53,6 @@ void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *m
     *patch = sum;
 }
 
-void gn_patch_add_run(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t first,
-                      uint32_t n)
-{
-    struct gn_patch sum = *patch;
-    for (uint32_t i = first; i < first + n; i++)
-        add_texel(&sum, map, i);
-    *patch = sum;
-}
-
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)
 {
     for (int c = 0; c < 3; c++) {

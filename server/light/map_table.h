@@ -17,6 +17,9 @@
 
 struct gn_radiance_map; // server/light/radiance_map.h
 
+/** Texels on a side of a block. */
+#define GN_MAP_BLOCK 8
+
 /** Thread-safety: immutable after create but for the spare map, which are atomic; shared (ref).
  */
 struct gn_map_table {
@@ -27,6 +30,9 @@ struct gn_map_table {
     float *solid_angle;         // [height][width] sr, owned
     float *direction_probe;     // [height][width][3] unit, owned
     float *direction_world;     // [height][width][3] unit, owned
+    float (*block)[4];          // [block rows][blocks of a row], owned: the middle of the world
+                                // directions of GN_MAP_BLOCK^2 texels, and how far the farthest of
+                                // them lies from it; below 0: none of them shows light
     int *span;                  // [height][2] first texel that shows light, one past the last
     float *gain;                // [height][width], owned: 1 / vignetting; NULL: 1
     const float *weight;        // [height][width] sr that a texel's light stands for: its own and
@@ -53,6 +59,13 @@ struct gn_map_table {
 GN_MUST_USE int gn_map_table_create(const struct gn_projection *projection,
                                     const double rotation[static 4], struct gn_map_table *previous,
                                     struct gn_pool *pool, struct gn_map_table **out_table);
+/** Blocks along a side of so many texels. */
+static inline int gn_map_table_get_blocks(int side)
+{
+    return (side + GN_MAP_BLOCK - 1) / GN_MAP_BLOCK;
+}
+/** Fills table->block; for server/light/map_table.c. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_map_table_bound_blocks(struct gn_map_table *table, struct gn_pool *pool);
 struct gn_map_table *gn_map_table_ref(struct gn_map_table *table);
 /** NULL-safe; nulls *table. */
 void gn_map_table_unref(struct gn_map_table **table);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "server/light/luminance.h"
+#include "server/light/map_table.h"
 
 /* The sums over the texels about one: a single texel's colour is noise. */
 static void sum_neighbours(const struct gn_radiance_map *map, uint32_t texel,
@@ -77,9 +78,10 @@ static int add_plain_lights(const struct gn_radiance_map *map, const struct gn_m
 /*
  * The partition goes by square blocks of texels: of all sites only those can be nearest to a texel
  * of the block that are no farther from its centre than the nearest one and twice its radius.
- * Distances are chords. Bands of blocks have sums of their own, added in order.
+ * Distances are chords. Groups of blocks choose for their blocks. Texels are then summed row by
+ * row, as memory is read fastest. Bands of groups have sums of their own, added in order.
  */
-enum { BLOCK = 16, N_BANDS = 8 };
+enum { BLOCK = GN_MAP_BLOCK, GROUP = 4, N_BANDS = 8, NO_SITE = -1 };
 
 /* Where samples are; those of one texel are one site. */
 struct site {
@@ -87,20 +89,21 @@ struct site {
     int first, n; // of the samples in order of their texels
 };
 
+/* A site that may be nearest to a texel of a block. */
+struct near_site {
+    float dir[3];
+    int site;
+};
+
 struct cells {
     const struct gn_radiance_map *map;
     int n_sites;
     struct site *sites;           // by rising texel
     int *order;                   // samples by rising texel
-    float (*dir)[3];              // [n_sites]
+    struct near_site *all;        // [n_sites]
     struct gn_patch *patches;     // [N_BANDS][n_sites]
-    struct near_site *near_sites; // [N_BANDS][n_sites]
-};
-
-/* A site that may be nearest to a texel of the block. */
-struct near_site {
-    float dir[3];
-    int site;
+    struct near_site *near_sites; // [N_BANDS][2][n_sites]: of the group, of the block
+    int *site;                    // [N_BANDS][GROUP * BLOCK][width] of each texel
 };
 
 static float get_squared_chord(const float a[static 3], const float b[static 3])
@@ -109,63 +112,131 @@ static float get_squared_chord(const float a[static 3], const float b[static 3])
     return x * x + y * y + z * z;
 }
 
-/* The block's candidates. Returns their number, 0 where it shows nothing. */
-static int list_near_sites(const struct cells *cells, const int corner[static 2],
-                           const int end[static 2], struct near_site *out_near)
+/* Those of n sites that can be nearest within the bound, in their order. Returns their number. */
+static int choose_sites(const struct near_site *sites, int n, const float bound[static 4],
+                        struct near_site *out_near)
 {
-    const struct gn_radiance_map *map = cells->map;
-    float centre[3] = {0}, radius = 0, nearest = INFINITY;
-    int n = 0, n_near = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int y = corner[1]; y < end[1]; y++)
-            for (int x = corner[0]; x < end[0]; x++) {
-                size_t i = (size_t)y * (size_t)map->radiance.width + (size_t)x;
-                const float *d = map->direction_world + 3 * i;
-                if (!(map->solid_angle[i] > 0))
-                    continue;
-                for (int c = 0; c < 3 && pass == 0; c++)
-                    centre[c] += d[c];
-                n += pass == 0;
-                if (pass == 1)
-                    radius = fmaxf(radius, get_squared_chord(centre, d));
-            }
-        for (int c = 0; c < 3 && pass == 0 && n > 0; c++)
-            centre[c] /= (float)n;
+    float nearest = INFINITY;
+    int n_near = 0;
+    for (int s = 0; s < n; s++) {
+        float squared = get_squared_chord(bound, sites[s].dir);
+        nearest = squared < nearest ? squared : nearest;
     }
-    if (n == 0)
-        return 0;
-    for (int s = 0; s < cells->n_sites; s++)
-        nearest = fminf(nearest, get_squared_chord(centre, cells->dir[s]));
-    float reach = sqrtf(nearest) + 2 * sqrtf(radius) + 1e-5f; // and what rounding may do
-    for (int s = 0; s < cells->n_sites; s++) {
-        if (!(get_squared_chord(centre, cells->dir[s]) <= reach * reach))
-            continue;
-        const float *d = cells->dir[s];
-        out_near[n_near++] = (struct near_site){{d[0], d[1], d[2]}, s};
-    }
+    float reach = sqrtf(nearest) + 2 * bound[3] + 1e-5f; // and what rounding may do
+    for (int s = 0; s < n; s++)
+        if (get_squared_chord(bound, sites[s].dir) <= reach * reach)
+            out_near[n_near++] = sites[s];
     return n_near;
 }
 
-static void sum_block(const struct cells *cells, const int corner[static 2],
-                      const int end[static 2], const struct near_site *near_sites, int n_near,
-                      struct gn_patch *patches)
+/* A ball about those of the group's blocks. False: they show nothing. */
+static bool bound_group(const float (*block)[4], size_t n_columns, const int size[static 2],
+                        float out_bound[static 4])
+{
+    float centre[3] = {0}, radius = 0;
+    int n = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < size[0] * size[1]; i++) {
+            const float *b = block[(size_t)(i / size[0]) * n_columns + (size_t)(i % size[0])];
+            if (b[3] < 0)
+                continue;
+            float reach = sqrtf(get_squared_chord(centre, b)) + b[3];
+            radius = pass == 1 && reach > radius ? reach : radius;
+            for (int c = 0; c < 3 && pass == 0; c++)
+                centre[c] += b[c];
+            n += pass == 0;
+        }
+        for (int c = 0; c < 3 && pass == 0 && n > 0; c++)
+            centre[c] /= (float)n;
+    }
+    memcpy(out_bound, centre, sizeof(centre));
+    out_bound[3] = radius;
+    return n > 0;
+}
+
+/* The nearest of the sites to each of n texels of a row of a block; of equals the first. */
+static void find_nearest(const float *direction, int n, const struct near_site *sites, int n_near,
+                         int out_nearest[static BLOCK])
+{
+    float x[BLOCK] = {0}, y[BLOCK] = {0}, z[BLOCK] = {0}, best[BLOCK];
+    for (int i = 0; i < n; i++) {
+        x[i] = direction[3 * i];
+        y[i] = direction[3 * i + 1];
+        z[i] = direction[3 * i + 2];
+    }
+    for (int i = 0; i < BLOCK; i++) {
+        best[i] = INFINITY;
+        out_nearest[i] = 0;
+    }
+    for (int s = 0; s < n_near; s++) {
+        const float *d = sites[s].dir;
+        for (int i = 0; i < BLOCK; i++) {
+            float dx = x[i] - d[0], dy = y[i] - d[1], dz = z[i] - d[2];
+            float squared = dx * dx + dy * dy + dz * dz;
+            out_nearest[i] = squared < best[i] ? s : out_nearest[i];
+            best[i] = squared < best[i] ? squared : best[i];
+        }
+    }
+}
+
+/* Which site each texel of a block belongs to, into rows of the band. */
+static void assign_block(const struct gn_radiance_map *map, size_t first, int n, int n_rows,
+                         const struct near_site *sites, int n_near, int *out_site)
+{
+    size_t width = (size_t)map->radiance.width;
+    for (int row = 0; row < n_rows; row++, first += width, out_site += width) {
+        int nearest[BLOCK] = {0};
+        if (n_near > 1)
+            find_nearest(map->direction_world + 3 * first, n, sites, n_near, nearest);
+        for (int i = 0; i < n; i++)
+            out_site[i] = n_near > 0 ? sites[nearest[i]].site : NO_SITE;
+    }
+}
+
+static int get_smaller(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+/* The group whose first block is that one. */
+static void assign_group(const struct cells *cells, int column, int row,
+                         struct near_site *near_sites, int *site)
 {
     const struct gn_radiance_map *map = cells->map;
-    for (int y = corner[1]; y < end[1]; y++) {
-        for (int x = corner[0]; x < end[0]; x++) {
-            uint32_t texel = (uint32_t)y * (uint32_t)map->radiance.width + (uint32_t)x;
-            if (!(map->solid_angle[texel] > 0))
-                continue;
-            const float *d = map->direction_world + 3 * (size_t)texel;
-            float best = INFINITY;
-            int site = 0;
-            for (int i = 0; i < n_near; i++) {
-                float squared = get_squared_chord(d, near_sites[i].dir);
-                site = squared < best ? near_sites[i].site : site;
-                best = squared < best ? squared : best;
-            }
-            gn_patch_add_texel(&patches[site], map, texel);
-        }
+    int width = map->radiance.width, height = map->radiance.height;
+    int n_columns = gn_map_table_get_blocks(width);
+    const int size[2] = {get_smaller(GROUP, n_columns - column),
+                         get_smaller(GROUP, gn_map_table_get_blocks(height) - row)};
+    const float(*block)[4] =
+        (const float(*)[4])map->table->block + (size_t)row * (size_t)n_columns + column;
+    float bound[4];
+    int n_group = 0;
+    if (bound_group(block, (size_t)n_columns, size, bound))
+        n_group = choose_sites(cells->all, cells->n_sites, bound, near_sites);
+    for (int i = 0; i < size[0] * size[1]; i++) {
+        int dx = i % size[0], dy = i / size[0];
+        int x = (column + dx) * BLOCK, y = (row + dy) * BLOCK;
+        const float *b = block[(size_t)dy * (size_t)n_columns + (size_t)dx];
+        struct near_site *chosen = near_sites + cells->n_sites;
+        int n_near = b[3] < 0 ? 0 : choose_sites(near_sites, n_group, b, chosen);
+        assign_block(map, (size_t)y * (size_t)width + (size_t)x, get_smaller(BLOCK, width - x),
+                     get_smaller(BLOCK, height - y), chosen, n_near,
+                     site + (size_t)(dy * BLOCK) * (size_t)width + x);
+    }
+}
+
+/* Adds each stretch of a row's texels to its site. */
+static void sum_row(const struct gn_radiance_map *map, int y, const int *site,
+                    struct gn_patch *patches)
+{
+    int width = map->radiance.width;
+    size_t start = (size_t)y * (size_t)width;
+    for (int x = 0, end = 0; x < width; x = end) {
+        while (end < width && site[end] == site[x])
+            end++;
+        if (site[x] != NO_SITE)
+            gn_patch_add_run(&patches[site[x]], map, (uint32_t)start + (uint32_t)x,
+                             (uint32_t)(end - x));
     }
 }
 
@@ -174,18 +245,18 @@ static void sum_band(void *context, int band, int worker)
     (void)worker;
     const struct cells *cells = context;
     int width = cells->map->radiance.width, height = cells->map->radiance.height;
-    int n_rows = (height + BLOCK - 1) / BLOCK;
-    struct near_site *near_sites = cells->near_sites + (size_t)band * (size_t)cells->n_sites;
-    struct gn_patch *patches = cells->patches + (size_t)band * (size_t)cells->n_sites;
-    for (int row = band * n_rows / N_BANDS; row < (band + 1) * n_rows / N_BANDS; row++) {
-        for (int x = 0; x < width; x += BLOCK) {
-            const int corner[2] = {x, row * BLOCK};
-            const int end[2] = {x + BLOCK < width ? x + BLOCK : width,
-                                corner[1] + BLOCK < height ? corner[1] + BLOCK : height};
-            int n_near = list_near_sites(cells, corner, end, near_sites);
-            if (n_near > 0)
-                sum_block(cells, corner, end, near_sites, n_near, patches);
-        }
+    int n_columns = gn_map_table_get_blocks(width);
+    int n_groups = (gn_map_table_get_blocks(height) + GROUP - 1) / GROUP;
+    size_t n = (size_t)cells->n_sites;
+    struct near_site *near_sites = cells->near_sites + 2 * (size_t)band * n;
+    struct gn_patch *patches = cells->patches + (size_t)band * n;
+    int *site = cells->site + (size_t)band * GROUP * BLOCK * (size_t)width;
+    for (int row = band * n_groups / N_BANDS; row < (band + 1) * n_groups / N_BANDS; row++) {
+        int y0 = row * GROUP * BLOCK, y1 = get_smaller(y0 + GROUP * BLOCK, height);
+        for (int column = 0; column < n_columns; column += GROUP)
+            assign_group(cells, column, row * GROUP, near_sites, site);
+        for (int y = y0; y < y1; y++)
+            sum_row(cells->map, y, site + (size_t)(y - y0) * (size_t)width, patches);
     }
 }
 
@@ -209,8 +280,8 @@ static int find_sites(struct cells *cells, const struct gn_map_samples *samples)
     struct placed *placed = malloc(n * sizeof(*placed));
     cells->order = malloc(n * sizeof(*cells->order));
     cells->sites = malloc(n * sizeof(*cells->sites));
-    cells->dir = malloc(n * sizeof(*cells->dir));
-    if (!placed || !cells->order || !cells->sites || !cells->dir) {
+    cells->all = malloc(n * sizeof(*cells->all));
+    if (!placed || !cells->order || !cells->sites || !cells->all) {
         free(placed);
         return -ENOMEM;
     }
@@ -221,8 +292,7 @@ static int find_sites(struct cells *cells, const struct gn_map_samples *samples)
         cells->order[i] = placed[i].sample;
         if (i == 0 || placed[i].texel != placed[i - 1].texel) {
             const float *d = cells->map->direction_world + 3 * (size_t)placed[i].texel;
-            for (int c = 0; c < 3; c++)
-                cells->dir[cells->n_sites][c] = d[c];
+            cells->all[cells->n_sites] = (struct near_site){{d[0], d[1], d[2]}, cells->n_sites};
             cells->sites[cells->n_sites++] = (struct site){placed[i].texel, i, 0};
         }
         cells->sites[cells->n_sites - 1].n++;
@@ -265,16 +335,19 @@ static int add_cells(const struct gn_radiance_map *map, const struct gn_map_samp
     if (rc == 0) {
         size_t n = (size_t)cells.n_sites * N_BANDS;
         cells.patches = calloc(n, sizeof(*cells.patches));
-        cells.near_sites = malloc(n * sizeof(*cells.near_sites));
-        rc = cells.patches && cells.near_sites ? 0 : -ENOMEM;
+        cells.near_sites = malloc(2 * n * sizeof(*cells.near_sites));
+        cells.site = malloc((size_t)N_BANDS * GROUP * BLOCK * (size_t)map->radiance.width *
+                            sizeof(*cells.site));
+        rc = cells.patches && cells.near_sites && cells.site ? 0 : -ENOMEM;
     }
     if (rc == 0) {
         gn_pool_run(pool, N_BANDS, sum_band, &cells);
         rc = add_cell_lights(&cells, samples, list);
     }
+    free(cells.site);
     free(cells.near_sites);
     free(cells.patches);
-    free(cells.dir);
+    free(cells.all);
     free(cells.sites);
     free(cells.order);
     return rc;
