@@ -64,7 +64,7 @@ static double get_n_fading(const struct gn_room_figures *f)
 
 static double get_light_age_s(const struct gn_room_figures *f)
 {
-    if (!f->has_light)
+    if (!f->has_capture)
         return -1;
     return 1e-3 * gn_clock_get_ms_between(f->light_capture_ns, gn_clock_get_monotonic_ns());
 }

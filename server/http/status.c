@@ -106,9 +106,10 @@ static json_t *make_light(const struct gn_room_figures *f)
                                        "min_irradiance", f->sh_min)
                            : json_null();
     return json_pack(
-        "{s:b, s:b, s:I, s:f, s:i, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}, s:o, s:o}", //
+        "{s:b, s:b, s:I, s:o, s:i, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}, s:o, s:o}", //
         "lit", 1, "environment_frame_waiting", f->has_environment_waiting, "sequence",
-        (json_int_t)f->light_sequence, "age_ms", get_ms_since(f->light_capture_ns), "lights",
+        (json_int_t)f->light_sequence, "age_ms",
+        f->has_capture ? json_real(get_ms_since(f->light_capture_ns)) : json_null(), "lights",
         f->n_lights, "published",
         (json_int_t)f->light_published, //
         "sh", sh, "ms", "decode", f->light_ms_decode, "map", f->light_ms_map, "sh", f->light_ms_sh,

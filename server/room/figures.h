@@ -28,7 +28,7 @@ struct gn_time_histogram {
 
 /** A room's figures; counters run since it was opened. */
 struct gn_room_figures {
-    int n_viewers, n_probes, n_objects, n_real_triangles, n_virtual_triangles;
+    int n_viewers, n_probes, n_screens, n_objects, n_real_triangles, n_virtual_triangles;
     uint64_t frames_in, frames_out, frames_dropped;
     uint64_t dropped_by_reason[GN_MSG_DROP_REASON_INTERNAL + 1]; // by enum gn_msg_drop_reason
     uint64_t environment_in, environment_superseded, environment_refused;
@@ -41,9 +41,10 @@ struct gn_room_figures {
     double busy_p50_ms;
     double holdable_fps_room;   // frames/s at 640 x 480, all viewers together; 0: not measured
     double holdable_fps_viewer; // each one's share
-    bool has_light;
+    bool has_light;             // of probes, or of the scene's own lamps
+    bool has_capture;           // of probes: only then it has an age
     uint64_t light_sequence, light_published;
-    int64_t light_capture_ns;
+    int64_t light_capture_ns; // where has_capture
     int n_lights;
     bool has_sh;      // the irradiance's harmonics are made
     int sh_order;     // 2 or 4

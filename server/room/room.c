@@ -169,6 +169,7 @@ int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
         room->sessions = s;
         room->n_viewers += s->role == GN_MSG_ROLE_VIEWER;
         room->n_probes += s->role == GN_MSG_ROLE_PROBE;
+        room->n_screens += s->role == GN_MSG_ROLE_SCREEN;
         room->n_subscribers += s->want_lighting_states;
         gn_cond_signal(&room->light_wake);
     }
@@ -198,6 +199,7 @@ void gn_room_leave(struct gn_room_session **session)
     *at = s->next;
     room->n_viewers -= s->role == GN_MSG_ROLE_VIEWER;
     room->n_probes -= s->role == GN_MSG_ROLE_PROBE;
+    room->n_screens -= s->role == GN_MSG_ROLE_SCREEN;
     room->n_subscribers -= s->want_lighting_states;
     if (s->slot >= 0)
         had_frame = gn_scheduler_remove(room->scheduler, s->slot, &job);

@@ -37,8 +37,14 @@ struct gn_room_session {
     uint64_t last_frame_id, last_environment_sequence, last_emitter_sequence;
 
     bool was_clipped; // guarded by room->mu: a frame of it was, and the log says so
-    bool was_told;    // guarded by room->mu: it was sent a lighting state, or is about to be
+    bool was_told; // guarded by room->mu: it was sent the lighting states there were, or is about
+                   // to be
     struct gn_session_figures figures; // guarded by room->mu
+};
+
+/** How far a probe's light has come. */
+struct gn_reached {
+    uint64_t stream, sequence;
 };
 
 struct gn_room {
@@ -57,7 +63,7 @@ struct gn_room {
     struct gn_cond render_wake; // a frame has come, or light
     bool is_stopping;           // guarded by mu, as all below
     struct gn_room_session *sessions;
-    int n_viewers, n_probes, n_subscribers;
+    int n_viewers, n_probes, n_screens, n_subscribers;
     struct gn_scheduler *scheduler;
     struct gn_probes probes;
     struct gn_screens screens;
@@ -66,9 +72,7 @@ struct gn_room {
     bool has_failed_to_complete;     // a light that lacks what somebody could use stays as it is
     struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
     int n_reached;                   // probes whose light is in `light`
-    struct {
-        uint64_t stream, sequence;
-    } reached[GN_PROBES_MAX];
+    struct gn_reached reached[GN_PROBES_MAX];
     int64_t light_asked_ns, composite_asked_ns; // when the page last looked; 0: never
     struct gn_snapshot *composite;              // a reference; NULL: nobody looks
     struct gn_room_figures figures;
