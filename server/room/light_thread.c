@@ -55,13 +55,14 @@ static bool is_light_wanted_locked(struct gn_room *room) GN_REQUIRES(room->mu)
            gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
 }
 
-/** Lists all subscribers, or those that were told nothing yet; counts them as told. */
-static void take_subscribers_locked(struct gn_room *room, bool newcomers_only,
-                                    struct subscribers *out) GN_REQUIRES(room->mu)
+/** Lists the subscribers that know the states there are, or those that are to be told of them all,
+ * who then count as told. */
+static void take_subscribers_locked(struct gn_room *room, bool newcomers, struct subscribers *out)
+    GN_REQUIRES(room->mu)
 {
     memset(out, 0, sizeof(*out));
     for (struct gn_room_session *s = room->sessions; s; s = s->next) {
-        if (!s->want_lighting_states || (newcomers_only && s->was_told))
+        if (!s->want_lighting_states || newcomers == s->was_told)
             continue;
         s->was_told = true;
         out->ids[out->n] = s->id;
@@ -107,8 +108,7 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
         out->is_short = is_light_short_locked(room, out->wants);
         if (out->is_short)
             break; // before anybody is told of it
-        if (room->light)
-            take_subscribers_locked(room, true, &out->newcomers);
+        take_subscribers_locked(room, true, &out->newcomers);
         int newest;
         if (out->newcomers.n > 0)
             out->n_lights = gn_probes_get_lights(&room->probes, out->lights, &newest);
@@ -147,6 +147,31 @@ static void refuse(struct gn_room *room, uint64_t session_id, enum gn_wire_type 
     gn_mailbox_post(room->options.mailbox, note);
 }
 
+/** Posts a LIGHTING_STATE of this room to one session. Returns 0 or -ENOMEM. */
+static int post_state(struct gn_room *room, uint64_t session_id,
+                      const struct gn_msg_lighting_state *body, struct gn_buf *payload)
+{
+    struct gn_note *note;
+    int rc = gn_mailbox_get_blank(room->options.mailbox, &note);
+    if (rc < 0)
+        return rc;
+    struct gn_msg_lighting_state *m = &note->body.lighting_state;
+    note->session_id = session_id;
+    note->type = GN_WIRE_LIGHTING_STATE;
+    *m = *body;
+    gn_wire_set_string(m->room, sizeof(m->room), room->name);
+    gn_wire_set_string(m->node, sizeof(m->node), room->node);
+    note->payload = payload ? gn_buf_ref(payload) : NULL;
+    gn_mailbox_post(room->options.mailbox, note);
+    return 0;
+}
+
+static void warn_not_sent(const struct gn_room *room, uint64_t sequence, int code)
+{
+    gn_log(GN_LOG_WARN, "room %s: lighting state %llu not sent: %s", room->name,
+           (unsigned long long)sequence, strerror(-code));
+}
+
 static void tell_subscribers(struct gn_room *room, const struct gn_lighting_state *state,
                              const struct subscribers *subscribers)
 {
@@ -158,24 +183,29 @@ static void tell_subscribers(struct gn_room *room, const struct gn_lighting_stat
     if (rc == 0 && subscribers->any_map)
         rc = gn_lighting_message_make(state, true, room->options.pool, &bodies[1], &payloads[1]);
     for (int i = 0; rc == 0 && i < subscribers->n; i++) {
-        struct gn_note *note;
-        rc = gn_mailbox_get_blank(room->options.mailbox, &note);
-        if (rc < 0)
-            break;
         int which = subscribers->want_map[i];
-        note->session_id = subscribers->ids[i];
-        note->type = GN_WIRE_LIGHTING_STATE;
-        note->body.lighting_state = bodies[which];
-        gn_wire_set_string(note->body.lighting_state.room, sizeof(bodies[0].room), room->name);
-        gn_wire_set_string(note->body.lighting_state.node, sizeof(bodies[0].node), room->node);
-        note->payload = gn_buf_ref(payloads[which]);
-        gn_mailbox_post(room->options.mailbox, note);
+        rc = post_state(room, subscribers->ids[i], &bodies[which], payloads[which]);
     }
     if (rc < 0)
-        gn_log(GN_LOG_WARN, "room %s: lighting state %llu not sent: %s", room->name,
-               (unsigned long long)state->sequence, strerror(-rc));
+        warn_not_sent(room, state->sequence, rc);
     gn_buf_unref(&payloads[0]);
     gn_buf_unref(&payloads[1]);
+}
+
+/** Tells those who know the probe's states that its light has gone. */
+static void tell_gone(struct gn_room *room, const struct gn_reached *probe)
+{
+    struct subscribers subscribers;
+    const struct gn_msg_lighting_state body = {
+        .sequence = probe->sequence, .probe = probe->stream, .gone = true};
+    gn_mutex_lock(&room->mu);
+    take_subscribers_locked(room, false, &subscribers);
+    gn_mutex_unlock(&room->mu);
+    int rc = 0;
+    for (int i = 0; rc == 0 && i < subscribers.n; i++)
+        rc = post_state(room, subscribers.ids[i], &body, NULL);
+    if (rc < 0)
+        warn_not_sent(room, probe->sequence, rc);
 }
 
 static void unref_all(struct gn_lighting_state **lights, int n)
@@ -254,10 +284,24 @@ static void show_picture(struct gn_room *room, struct gn_screen_decoder *decoder
     gn_buf_unref(&job->payload);
 }
 
-/** How far each probe's light has come that is the room's now: frames may wait for it. */
+static bool has_stream(struct gn_lighting_state *const *lights, int n, uint64_t stream)
+{
+    for (int i = 0; i < n; i++)
+        if (lights[i]->stream == stream)
+            return true;
+    return false;
+}
+
+/** How far each probe's light has come that is the room's now: frames may wait for it, and
+ * subscribers forget the others. */
 static void set_reached(struct gn_room *room, struct gn_lighting_state *const *lights, int n)
 {
+    struct gn_reached gone[GN_PROBES_MAX];
+    int n_gone = 0;
     gn_mutex_lock(&room->mu);
+    for (int i = 0; i < room->n_reached; i++)
+        if (!has_stream(lights, n, room->reached[i].stream))
+            gone[n_gone++] = room->reached[i];
     room->n_reached = n;
     for (int i = 0; i < n; i++) {
         room->reached[i].stream = lights[i]->stream;
@@ -265,6 +309,16 @@ static void set_reached(struct gn_room *room, struct gn_lighting_state *const *l
     }
     gn_cond_signal(&room->render_wake);
     gn_mutex_unlock(&room->mu);
+    for (int i = 0; i < n_gone; i++)
+        tell_gone(room, &gone[i]);
+}
+
+static bool is_reached_locked(const struct gn_room *room, uint64_t stream) GN_REQUIRES(room->mu)
+{
+    for (int i = 0; i < room->n_reached; i++)
+        if (room->reached[i].stream == stream)
+            return true;
+    return false;
 }
 
 /** Makes the light of all probes the room's, and the scene's own with it. */
@@ -364,7 +418,6 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
         room->figures.light_ms_decode = ms_decode;
         room->has_failed_to_complete = false;
         count_state_locked(room, mine, is_same);
-        take_subscribers_locked(room, false, &subscribers);
     }
     gn_mutex_unlock(&room->mu);
     for (int i = 0; i < n_old; i++)
@@ -372,7 +425,11 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
     if (is_there) {
         warn_of_clipping(room, probe_id, mine);
         join_lights(room);
-        if (subscribers.n > 0)
+        gn_mutex_lock(&room->mu);
+        is_there = is_reached_locked(room, mine->stream); // its probe may have left
+        take_subscribers_locked(room, false, &subscribers);
+        gn_mutex_unlock(&room->mu);
+        if (is_there && subscribers.n > 0)
             tell_subscribers(room, mine, &subscribers);
     }
     gn_lighting_state_unref(&mine);

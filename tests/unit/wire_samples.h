@@ -169,8 +169,8 @@ static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_mess
         m->dropped = (struct gn_msg_dropped){9, GN_MSG_DROP_REASON_INTERNAL, "because"};
         return 0;
     case GN_WIRE_LIGHTING_STATE:
-        m->lighting_state =
-            (struct gn_msg_lighting_state){"lab", "node", 5, 6, {0}, 2, 4, 2, 9, {-1, 0.5f, 2}};
+        m->lighting_state = (struct gn_msg_lighting_state){
+            "lab", "node", 5, 6, {0}, 2, 4, 2, 9, {-1, 0.5f, 2}, true};
         for (int i = 0; i < 27; i++)
             m->lighting_state.sh[i] = (float)(i - 13);
         return 2 * GN_LIGHT_RECORD_BYTES + 4 * 2 * 6;
