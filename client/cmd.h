@@ -51,18 +51,19 @@ int gn_cmd_doctor(int argc, char *const argv[]);
          .value_name = "PATTERN",                                                                  \
          .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
                  "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
-        GN_CMD_PACE_OPTIONS
+        GN_CMD_PACE_OPTIONS("Without it a sequence keeps its own times; files go at 10.")
 
-/** Rows of the option table that every command which replays pictures has. */
-#define GN_CMD_PACE_OPTIONS                                                                        \
+/** Rows of the option table that every command which replays pictures has; default_rate: a sentence
+ * that says at which rate where --rate is not given. */
+#define GN_CMD_PACE_OPTIONS(default_rate)                                                          \
     {.key = "rate",                                                                                \
      .flag = "rate",                                                                               \
      .type = GN_OPTION_DOUBLE,                                                                     \
      .min = 0.001,                                                                                 \
      .max = 1000,                                                                                  \
      .value_name = "HZ",                                                                           \
-     .help = "Pictures per second. Without it a sequence keeps its own times; files go at "        \
-             "10. Up to 2 s late a replay catches up; beyond, the rest is shifted and said."},     \
+     .help = "Pictures per second. " default_rate                                                  \
+             " Up to 2 s late a replay catches up; beyond, the rest is shifted and said."},        \
         {.key = "start-at",                                                                        \
          .flag = "start-at",                                                                       \
          .type = GN_OPTION_DOUBLE,                                                                 \

@@ -202,8 +202,7 @@ struct probe {
     uint64_t first_sequence;
     int64_t clock_ns; // when the clock was measured
     long n_sent;
-    uint8_t *halves; // [2 n_halves], owned
-    size_t n_halves;
+    struct gn_halves halves;
     bool has_told_halves;
 };
 
@@ -230,21 +229,16 @@ static int get_pixels(struct probe *p, const struct gn_capture *capture, struct 
     bool is_exact = gn_halves_are_exact(values, n);
     if (!is_exact && capture->data_bytes <= GN_LIMIT_ENVIRONMENT_BYTES)
         return 0;
-    if (p->n_halves < n) {
-        free(p->halves);
-        p->halves = malloc(2 * n);
-        p->n_halves = p->halves ? n : 0;
-        if (!p->halves)
-            return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
-    }
-    double scale = gn_halves_pack(values, n, p->halves);
+    double scale;
+    if (gn_halves_fill(&p->halves, values, n, &scale) < 0)
+        return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
     if (!is_exact && !p->has_told_halves) {
         p->has_told_halves = true;
         printf("%s: too large for floats, sent as half floats times %g: exact to 0.05 %%, below "
                "%.3g to %.3g\n",
                capture->name, scale, scale * 0x1p-14, scale * 0x1p-25);
     }
-    *out = (struct pixels){GN_MSG_PIXEL_FORMAT_RGB_F16, scale, p->halves, 2 * n};
+    *out = (struct pixels){GN_MSG_PIXEL_FORMAT_RGB_F16, scale, p->halves.data, 2 * n};
     return 0;
 }
 
@@ -338,7 +332,7 @@ int gn_cmd_probe(int argc, char *const argv[])
         p.clock_ns = gn_clock_get_monotonic_ns();
         status = run(&p, &pace);
     }
-    free(p.halves);
+    gn_halves_finish(&p.halves);
     gn_cmd_disconnect(&p.client);
     gn_source_close(&p.source);
     gn_options_destroy(&options);

@@ -41,7 +41,7 @@ static const struct gn_option option_table[] = {
      .default_value = "1",
      .value_name = "X",
      .help = "How bright: factor on the linear picture and the scene's emission_scale."},
-    GN_CMD_PACE_OPTIONS,
+    GN_CMD_PACE_OPTIONS("Without it they go at 10."),
 };
 
 static const struct gn_program program = {
@@ -64,25 +64,8 @@ struct screen {
     double scale;
     int64_t clock_ns; // when the clock was measured
     long n_sent;
-    uint8_t *halves; // [n_halves][2], owned
-    size_t n_halves;
+    struct gn_halves halves;
 };
-
-/** Halves of a linear picture, and the factor they have to be multiplied by. */
-static int pack(struct screen *s, const struct gn_capture *capture, double *out_scale,
-                struct gn_error *out_error)
-{
-    size_t n = capture->data_bytes / sizeof(float);
-    if (s->n_halves < n) {
-        free(s->halves);
-        s->halves = malloc(2 * n);
-        s->n_halves = s->halves ? n : 0;
-        if (!s->halves)
-            return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
-    }
-    *out_scale = gn_halves_pack((const float *)(const void *)capture->data, n, s->halves);
-    return 0;
-}
 
 static int check_capture(const struct gn_capture *capture, struct gn_error *out_error)
 {
@@ -109,12 +92,13 @@ static int send_capture(struct screen *s, const struct gn_capture *capture,
     size_t n_bytes = capture->data_bytes;
     double scale = 1;
     int err = check_capture(capture, out_error);
-    if (!err && is_linear)
-        err = pack(s, capture, &scale, out_error);
     if (err)
         return err;
     if (is_linear) {
-        data = s->halves;
+        if (gn_halves_fill(&s->halves, (const float *)(const void *)capture->data,
+                           capture->data_bytes / sizeof(float), &scale) < 0)
+            return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
+        data = s->halves.data;
         n_bytes = capture->data_bytes / 2;
     }
     s->frame.sequence = (uint64_t)s->n_sent + 1;
@@ -210,7 +194,7 @@ int gn_cmd_screen(int argc, char *const argv[])
         s.clock_ns = gn_clock_get_monotonic_ns();
         status = run(&s, &pace);
     }
-    free(s.halves);
+    gn_halves_finish(&s.halves);
     gn_cmd_disconnect(&s.client);
     gn_source_close(&s.source);
     gn_options_destroy(&options);

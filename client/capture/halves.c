@@ -2,7 +2,9 @@
 /* SPDX-License-Identifier: ISC */
 #include "client/capture/halves.h"
 
+#include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 
 #include "common/half.h"
 
@@ -33,4 +35,23 @@ double gn_halves_pack(const float *values, size_t n, uint8_t *out)
         out[2 * i + 1] = (uint8_t)(half >> 8);
     }
     return scale;
+}
+
+int gn_halves_fill(struct gn_halves *halves, const float *values, size_t n, double *out_scale)
+{
+    if (halves->n < n) {
+        gn_halves_finish(halves);
+        halves->data = malloc(2 * n);
+        if (!halves->data)
+            return -ENOMEM;
+        halves->n = n;
+    }
+    *out_scale = gn_halves_pack(values, n, halves->data);
+    return 0;
+}
+
+void gn_halves_finish(struct gn_halves *halves)
+{
+    free(halves->data);
+    *halves = (struct gn_halves){0};
 }

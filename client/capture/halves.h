@@ -8,6 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "proto/attr.h"
+
 /** True where every value is a half float to the bit (NaN and infinity as they are). */
 bool gn_halves_are_exact(const float *values, size_t n);
 
@@ -17,5 +19,15 @@ bool gn_halves_are_exact(const float *values, size_t n);
  * there is exact to 2^-25. Returns 2^k, by which a reader multiplies.
  */
 double gn_halves_pack(const float *values, size_t n, uint8_t *out);
+
+/** Room for halves that grows with the pictures. All-zero: none. */
+struct gn_halves {
+    uint8_t *data; // [n][2], owned
+    size_t n;
+};
+/** gn_halves_pack() into *halves. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_halves_fill(struct gn_halves *halves, const float *values, size_t n,
+                               double *out_scale);
+void gn_halves_finish(struct gn_halves *halves);
 
 #endif
