@@ -69,8 +69,8 @@ void gn_probes_finish(struct gn_probes *probes);
  */
 GN_MUST_USE int gn_probes_put(struct gn_probes *probes, const struct gn_environment_job *job,
                               bool is_new, struct gn_probe *out_old);
-/** The longest untaken of those that wait; of probes that have lit the room before only where
- * all. False: none. Either gn_probes_set_light() or gn_probes_refuse() must follow. */
+/** A frame of the probe whose last turn is longest ago; of probes that have lit the room before
+ * only where all. False: none. Either gn_probes_set_light() or gn_probes_refuse() must follow. */
 bool gn_probes_take(struct gn_probes *probes, bool all, struct gn_probe_work *out_work);
 /** True where a frame waits. */
 bool gn_probes_has_frame(const struct gn_probes *probes);

@@ -122,7 +122,7 @@ void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figur
 /** Up to cap sessions' figures; returns how many. */
 int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_sessions, int cap);
 
-/** The probes that have lit the room; returns how many. */
+/** The probes whose light is in the room's; returns how many. */
 int gn_room_get_probes(struct gn_room *room,
                        struct gn_probe_figures out_probes[static GN_PROBES_MAX]);
 

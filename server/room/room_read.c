@@ -78,16 +78,30 @@ int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_se
     return n;
 }
 
+static bool is_reached(const struct gn_reached *reached, int n, uint64_t session_id)
+{
+    for (int i = 0; i < n; i++)
+        if (reached[i].stream == session_id)
+            return true;
+    return false;
+}
+
 int gn_room_get_probes(struct gn_room *room,
                        struct gn_probe_figures out_probes[static GN_PROBES_MAX])
 {
     struct gn_time_window intervals[GN_PROBES_MAX];
+    struct gn_reached reached[GN_PROBES_MAX];
     gn_mutex_lock(&room->mu);
-    int n = gn_probes_get_figures(&room->probes, out_probes, intervals);
+    int n_lit = gn_probes_get_figures(&room->probes, out_probes, intervals);
+    int n_reached = room->n_reached, n = 0;
+    memcpy(reached, room->reached, sizeof(reached));
     gn_mutex_unlock(&room->mu);
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n_lit; i++) {
         double ms = gn_time_window_get(&intervals[i], 0.5);
-        out_probes[i].rate_hz = ms > 0 ? 1000 / ms : 0;
+        if (!is_reached(reached, n_reached, out_probes[i].session_id))
+            continue; // its first light is not shown yet
+        out_probes[n] = out_probes[i];
+        out_probes[n++].rate_hz = ms > 0 ? 1000 / ms : 0;
     }
     return n;
 }

@@ -50,8 +50,8 @@ GN_MUST_USE int gn_screens_find(const struct gn_screens *screens, const char *na
  * there, or NULL. */
 void gn_screens_put(struct gn_screens *screens, const struct gn_emitter_job *job,
                     struct gn_buf **out_superseded);
-/** The picture that has waited longest; where !all only the first of a stream, so that its sender
- * learns what is wrong with it. False: none. */
+/** A picture of the stream whose last turn is longest ago; where !all only the first of a stream,
+ * so that its sender learns what is wrong with it. False: none. */
 bool gn_screens_take(struct gn_screens *screens, bool all, struct gn_emitter_job *out_job);
 
 /** What decoding keeps from picture to picture; zero it before first use. Thread-safety: unsafe. */
