@@ -29,7 +29,7 @@ const char *gn_wire_get_error_text(enum gn_msg_error_code code)
     case GN_MSG_ERROR_CODE_NOT_ALLOWED:
         return "the token or ticket does not allow this";
     case GN_MSG_ERROR_CODE_FULL:
-        return "the server or the room takes no more sessions now";
+        return "the server or the room takes no more sessions, or probes, now";
     case GN_MSG_ERROR_CODE_BAD_RESUME:
         return "there is no session to resume with this token";
     case GN_MSG_ERROR_CODE_TIMEOUT:
