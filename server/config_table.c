@@ -90,8 +90,8 @@ static const struct gn_option table[] = {
              "to it; the same power; or its radiance over the samples' density."},
     {ROOM, .key = "light-relaxed", .type = GN_OPTION_BOOL, .default_value = "false",
      .help = "Moves importance samples by the correction table: laid out more evenly, but they "
-             "move when the light changes. For light that stands still; gnomon-render, which sees one "
-             "moment, has it on."},
+             "move when the light changes. For light that stands still; gnomon-render, which sees "
+             "one moment, has it on."},
     {ROOM, .key = "light-smoothing-ms", .type = GN_OPTION_DOUBLE, .min = 0, .max = 10000,
      .default_value = "400",
      .help = "Time constant by which light at rest follows the environment frames, so that the "

@@ -132,8 +132,8 @@ static const struct gn_option table[] = {
     {.key = "light-relaxed",
      .type = GN_OPTION_BOOL,
      .default_value = "true",
-     .help = "Moves importance samples by the correction table, which lays them out more evenly. Off "
-             "in gnomond, whose light changes: they would move with it."},
+     .help = "Moves importance samples by the correction table, which lays them out more evenly. "
+             "Off in gnomond, whose light changes: they would move with it."},
     {.key = "shadow-cosine",
      .type = GN_OPTION_BOOL,
      .default_value = "true",
