@@ -19,8 +19,8 @@
 // Longest "name".
 #define MAX_NAME 255
 
-static const char *const material_names[] = {"diffuse", "mirror", "glass", "ggx"};
-static const int n_built_materials = 2; // the first of them: enum gn_material_type
+static const char *const material_names[] = {"diffuse", "mirror"}; // enum gn_material_type
+static const char *const unbuilt_materials[] = {"glass", "ggx"};
 
 /** path of the mesh: as it is where absolute, else beside the manifest. */
 static int join_path(const char *manifest, const char *mesh, char out[static PATH_MAX])
@@ -29,6 +29,22 @@ static int join_path(const char *manifest, const char *mesh, char out[static PAT
     int n_folder = mesh[0] != '/' && slash ? (int)(slash - manifest) + 1 : 0;
     int n = snprintf(out, PATH_MAX, "%.*s%s", n_folder, manifest, mesh);
     return n < 0 || n >= PATH_MAX ? -ENAMETOOLONG : 0;
+}
+
+static int read_material_type(const struct gn_json *material, int *out_type,
+                              struct gn_error *out_error)
+{
+    const char *name = NULL;
+    int ret = gn_json_get_string(material, "type", &name, out_error);
+    if (ret < 0)
+        return ret;
+    for (size_t i = 0; i < LENGTH(unbuilt_materials); i++) {
+        if (strcmp(name, unbuilt_materials[i]) == 0)
+            return gn_json_refuse(material, "type", out_error,
+                                  "\"%s\" is not built yet; diffuse and mirror are", name);
+    }
+    return gn_json_get_enum(material, "type", material_names, LENGTH(material_names), out_type,
+                            out_error);
 }
 
 static int read_material(const struct gn_json *item, struct gn_scene_object *object,
@@ -45,14 +61,9 @@ static int read_material(const struct gn_json *item, struct gn_scene_object *obj
     if (ret == 0)
         ret = gn_json_check_keys(&material, keys, LENGTH(keys), out_error);
     if (ret == 0)
-        ret = gn_json_get_enum(&material, "type", material_names, LENGTH(material_names), &type,
-                               out_error);
+        ret = read_material_type(&material, &type, out_error);
     if (ret < 0)
         return ret;
-    if (type >= n_built_materials)
-        return gn_json_refuse(&material, "type", out_error,
-                              "\"%s\" is not built yet; diffuse and mirror are",
-                              material_names[type]);
     for (size_t i = 0; i < LENGTH(refused); i++) {
         if (gn_json_has(&material, refused[i]))
             return gn_json_refuse(&material, refused[i], out_error, "a %s material has none",
