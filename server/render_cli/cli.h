@@ -91,7 +91,8 @@ struct gn_cli_result {
     double ms_scene, ms_light, ms_total;
 };
 
-/** Refuses outputs that cannot be written or share a path, before anything is rendered. */
+/** Refuses outputs that cannot be written, share a path or have another format's ending, before
+ * anything is rendered. */
 GN_MUST_USE int gn_cli_check_outputs(const struct gn_cli_request *request,
                                      struct gn_error *out_error);
 

@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,6 +9,7 @@
 #include "common/image_file.h"
 #include "common/json.h"
 #include "server/light/blend.h"
+#include "server/light/map_geometry.h"
 #include "server/render_cli/cli.h"
 
 /** --env-params, with what the command line says besides. */
@@ -67,6 +69,17 @@ static int init_projection(const struct gn_cli_request *request, const struct gn
     return 0;
 }
 
+/** Says so where the global model does nothing: a probe whose place is wrong looks past all. */
+static void note_model(const struct gn_cli_request *request, const struct gn_lighting_state *state)
+{
+    const struct gn_map_geometry *geometry = state->map->geometry;
+    if (geometry && geometry->n_covered == 0)
+        fprintf(stderr,
+                "gnomon-render: note: %s: the global model changes nothing, from [%g, %g, %g] m "
+                "the probe sees no real object: is \"position\" in --env-params its place?\n",
+                request->env, geometry->position[0], geometry->position[1], geometry->position[2]);
+}
+
 /** Of one probe. */
 static int read_probe(const struct gn_cli_request *request, const struct gn_scene *scene,
                       const struct gn_render_needs *needs, struct gn_pool *pool,
@@ -115,6 +128,8 @@ static int read_probe(const struct gn_cli_request *request, const struct gn_scen
     ret = gn_lighting_state_create(&frame, &map, &light, pool, out_state, &reason);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", request->env, reason.text);
+    else
+        note_model(request, *out_state);
 out:
     gn_image_finish(&image);
     gn_image_file_finish(&file);

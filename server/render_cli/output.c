@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "common/composite.h"
@@ -29,12 +30,39 @@ static int list_outputs(const struct gn_cli_request *request, const char *out[MA
     return n;
 }
 
+/** Names say what is in the files. */
+static int check_names(const struct gn_cli_request *request, struct gn_error *out_error)
+{
+    const struct {
+        const char *key, *path, *ending;
+    } outputs[] = {
+        {"out", request->out, ".exr"},
+        {"irradiance-map", request->irradiance_map, ".exr"},
+        {"light-map", request->light_map, ".png"},
+        {"shadow-png", request->shadow_png, ".png"},
+        {"composite-png", request->composite_png, ".png"},
+    };
+    for (size_t i = 0; i < sizeof(outputs) / sizeof(outputs[0]); i++) {
+        if (!outputs[i].path)
+            continue;
+        size_t n = strlen(outputs[i].path), n_ending = strlen(outputs[i].ending);
+        if (n <= n_ending || strcasecmp(outputs[i].path + n - n_ending, outputs[i].ending) != 0)
+            return gn_error_set(out_error, -EINVAL,
+                                "--%s %s: is written as %s: the name must end so", outputs[i].key,
+                                outputs[i].path, outputs[i].ending);
+    }
+    return 0;
+}
+
 int gn_cli_check_outputs(const struct gn_cli_request *request, struct gn_error *out_error)
 {
     const char *const inputs[] = {request->scene, request->env, request->env_params,
                                   request->camera, request->background};
     const char *outputs[MAX_OUTPUTS];
     int n = list_outputs(request, outputs);
+    int ret = check_names(request, out_error);
+    if (ret < 0)
+        return ret;
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < i; k++) {
             if (strcmp(outputs[i], outputs[k]) == 0)
@@ -45,7 +73,7 @@ int gn_cli_check_outputs(const struct gn_cli_request *request, struct gn_error *
                 return gn_error_set(out_error, -EINVAL, "%s: an input and an output", outputs[i]);
         }
         struct gn_file_writer writer = {0};
-        int ret = gn_file_writer_open(&writer, outputs[i], out_error);
+        ret = gn_file_writer_open(&writer, outputs[i], out_error);
         if (ret < 0)
             return ret;
         gn_file_writer_abort(&writer);

@@ -274,6 +274,18 @@ def file_of(option, name, data):
     return {option: name}
 
 
+def test_global_model_that_does_nothing_is_noted():
+    """A probe on the floor sees none of it; one above sees it in its lower half."""
+    scene = dict(SCENE, model='global')
+    write('global.json', json.dumps(scene))
+    write('up.json', '{"projection": "latlong", "position": [0, 0, 0.3]}')
+    for changes, n_lines in ({}, 1), ({'env_params': 'up.json'}, 0):
+        done = run(scene='global.json', **changes)
+        error = done.stderr.decode()
+        check(done.returncode == 0 and error.count('\n') == n_lines, error)
+        check(n_lines == 0 or 'note: ' in error and '"position"' in error, error)
+
+
 def list_bad():
     """(what the error must hold, further options, changed inputs)"""
     params = {'env_params': 'p.json'}
@@ -288,6 +300,10 @@ def list_bad():
     yield 'absent.params', [], {'env_params': 'absent.params'}
     yield 'nowhere/out.exr', [], {'out': 'nowhere/out.exr'}
     yield 'nowhere/report', ['--report', 'nowhere/report'], {}
+    for key, name in (('out', 'x.png'), ('irradiance-map', 'x.png'), ('light-map', 'x.exr'),
+                      ('shadow-png', 'x.exr'), ('composite-png', 'exr'), ('out', '.exr')):
+        more = {'background': 'grey.png'} if key == 'composite-png' else {}
+        yield '--%s %s: ' % (key, name), ['--report', 'report.json'], dict({key.replace('-', '_'): name}, **more)
     yield 'two outputs', ['--report', 'out.exr'], {}
     yield 'an input and an output', ['--report', 'camera.json'], {}
     yield '--budget-ms', ['--budget-ms', '20'], {}
