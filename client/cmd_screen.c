@@ -151,6 +151,8 @@ static int run(struct screen *s, struct gn_cmd_pace *pace)
         gn_error_set(&error, err, "interrupted");
     if (!is_ended)
         gn_cmd_fail(&program, error.text);
+    if (!is_ended && err != -EINTR)
+        return 1; // the server need not have taken what was sent
     printf("%ld pictures sent", s->n_sent);
     gn_cmd_pace_print(pace);
     printf("\n");

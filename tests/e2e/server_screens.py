@@ -191,6 +191,7 @@ def test_command():
             assert blue[2] > 2 * blue[0], list(blue)
             status, out, err = gnomon(daemon, '--stream', 'radio', '--files', at('a.png'))
             assert status == 1 and 'tv, wall' in err and err.count('\n') == 1, (status, err)
+            assert 'sent' not in out, out
             at('wide.png', png_bytes(2049, 1, RED * 2049))
             status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('wide.png'))
             assert status == 1 and '2049x1' in err and '2048' in err, (status, err)
