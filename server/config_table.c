@@ -58,11 +58,14 @@ static const struct gn_option table[] = {
              "file's folder."},
     {ROOM, .key = "light-method", .type = GN_OPTION_ENUM, .choices = GN_LIGHT_METHOD_NAMES,
      .default_value = "partition",
-     .help = "How lights are made from the radiance map: regions that keep their energy; the 2007 "
-             "paper's regions to the letter; or the importance samples themselves."},
+     .help = "How lights are made from the radiance map. partition: the 2007 paper's regions, each "
+             "with its energy; seed: those to the letter; penrose: importance samples; median-cut: "
+             "regions of equal energy; variance: regions of least spread; inversion: spread points "
+             "moved to where the energy is; quadtree: leaves of a tree that holds still in video."},
     {ROOM, .key = "lights", .type = GN_OPTION_INT, .min = 1, .max = GN_LIGHTS_MAX,
      .default_value = "64",
-     .help = "Lights to aim at, where the method can aim (partition and penrose)."},
+     .help = "Lights to aim at, with every method but seed. A sun's disc is spread over 8 to 32 "
+             "directions besides, so a frame's receipt may count more."},
     {ROOM, .key = "light-rings", .type = GN_OPTION_INT, .min = 0, .max = 64, .default_value = "0",
      .help = "Rings of the base division of a hemisphere; 0: the method's own."},
     {ROOM, .key = "light-sectors", .type = GN_OPTION_INT, .min = 0, .max = 256,

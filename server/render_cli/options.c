@@ -79,11 +79,17 @@ static const struct gn_option table[] = {
      .min = 1,
      .max = GN_LIGHTS_MAX,
      .value_name = "N",
-     .help = "Wanted number of lights, where the method can aim; without it: the method's own."},
+     .help = "Wanted number of lights, with every method but seed; without it: the method's own. "
+             "A sun's disc is spread over 8 to 32 directions besides, so the report may count "
+             "more."},
     {.key = "light-method",
      .type = GN_OPTION_ENUM,
      .choices = GN_LIGHT_METHOD_NAMES,
-     .help = "How the map becomes lights; without it: partition, or seed with --quality seed."},
+     .help = "How the map becomes lights. partition: the 2007 paper's regions, each with its "
+             "energy; seed: those to the letter; penrose: importance samples; median-cut: regions "
+             "of equal energy; variance: regions of least spread; inversion: spread points moved "
+             "to where the energy is; quadtree: leaves of a tree that holds still in video. "
+             "Without it: partition, or seed with --quality seed."},
     {.key = "light-rings",
      .type = GN_OPTION_INT,
      .min = 1,
