@@ -427,6 +427,8 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
         join_lights(room);
         gn_mutex_lock(&room->mu);
         is_there = is_reached_locked(room, mine->stream); // its probe may have left
+        gn_probes_settle(&room->probes, probe_id);
+        gn_cond_signal(&room->render_wake);
         take_subscribers_locked(room, false, &subscribers);
         gn_mutex_unlock(&room->mu);
         if (is_there && subscribers.n > 0)

@@ -35,6 +35,12 @@ static struct gn_probe *find(struct gn_probes *probes, uint64_t session_id)
     return NULL;
 }
 
+/* True for one that lights the room, or is about to. */
+static bool may_light(const struct gn_probe *probe)
+{
+    return probe->light || probe->has_frame || probe->is_at_work;
+}
+
 /* A slot for one more probe: a free one, that of one that has left, that of one that was of no use.
  */
 static struct gn_probe *find_room(struct gn_probes *probes)
@@ -42,7 +48,7 @@ static struct gn_probe *find_room(struct gn_probes *probes)
     struct gn_probe *useless = NULL;
     for (int i = 0; i < GN_PROBES_MAX; i++) {
         struct gn_probe *p = &probes->slots[i];
-        if (p->session_id == 0 || (p->has_left && !p->light && !p->has_frame))
+        if (p->session_id == 0 || (p->has_left && !may_light(p)))
             return p;
         if (p->was_refused && !p->is_at_work)
             useless = p;
@@ -150,7 +156,7 @@ void gn_probes_refuse(struct gn_probes *probes, uint64_t session_id, struct gn_w
     *(!p || p->has_left ? &out_old->worked : &p->worked) = worked;
     if (!p)
         return;
-    p->is_at_work = false;
+    p->is_at_work = p->is_owed = false;
     if (!p->light) {
         p->was_refused = true;
         p->began = 0;
@@ -175,14 +181,15 @@ struct gn_lighting_state *gn_probes_replace_light(struct gn_probes *probes,
 void gn_probes_leave(struct gn_probes *probes, uint64_t session_id, struct gn_probe *out_old)
 {
     struct gn_probe *p = find(probes, session_id);
-    bool has_others = false;
+    bool has_others = false; // that are still there
     *out_old = (struct gn_probe){0};
     if (!p)
         return;
     for (int i = 0; i < GN_PROBES_MAX; i++)
-        has_others = has_others || (&probes->slots[i] != p && probes->slots[i].light);
+        has_others = has_others || (&probes->slots[i] != p && probes->slots[i].light &&
+                                    !probes->slots[i].has_left);
     p->has_left = true;
-    if (has_others) {
+    if (has_others || !may_light(p)) {
         move_out(p, out_old);
     } else {
         out_old->worked = p->worked;
@@ -190,12 +197,33 @@ void gn_probes_leave(struct gn_probes *probes, uint64_t session_id, struct gn_pr
     }
 }
 
+void gn_probes_owe(struct gn_probes *probes)
+{
+    for (int i = 0; i < GN_PROBES_MAX; i++)
+        probes->slots[i].is_owed = probes->slots[i].has_frame || probes->slots[i].is_at_work;
+}
+
+void gn_probes_settle(struct gn_probes *probes, uint64_t session_id)
+{
+    struct gn_probe *p = find(probes, session_id);
+    if (p)
+        p->is_owed = false;
+}
+
+bool gn_probes_is_owing(const struct gn_probes *probes)
+{
+    for (int i = 0; i < GN_PROBES_MAX; i++)
+        if (probes->slots[i].is_owed)
+            return true;
+    return false;
+}
+
 uint64_t gn_probes_get_newest(const struct gn_probes *probes)
 {
     const struct gn_probe *newest = NULL;
     for (int i = 0; i < GN_PROBES_MAX; i++) {
         const struct gn_probe *p = &probes->slots[i];
-        if (p->began > 0 && (p->light || !p->has_left) && (!newest || p->began > newest->began))
+        if (p->began > 0 && (may_light(p) || !p->has_left) && (!newest || p->began > newest->began))
             newest = p;
     }
     return newest ? newest->session_id : 0;

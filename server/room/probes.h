@@ -3,9 +3,10 @@
 /*
  * The probes that light a room: a slot for each, with its unread frame (the newest wins) and the
  * state of its last one. The light thread takes frames from them in turn, so that a quick probe
- * does not starve a slow one. A probe that has left keeps its slot only while no other has lit the
- * room. What goes is handed out, to be freed once the lock is given back. Thread-safety: unsafe;
- * the room's lock is held for every call but gn_probe_finish().
+ * does not starve a slow one. A probe that has left keeps its slot, and with it what it sent last,
+ * only while no probe that is still there has lit the room. What goes is handed out, to be freed
+ * once the lock is given back. Thread-safety: unsafe; the room's lock is held for every call but
+ * gn_probe_finish().
  */
 #ifndef GN_SERVER_ROOM_PROBES_H
 #define GN_SERVER_ROOM_PROBES_H
@@ -31,6 +32,7 @@ struct gn_probe {
     bool has_left;       // its session has ended
     bool has_frame;
     bool is_at_work;               // a frame of it was taken, and neither lit the room nor refused
+    bool is_owed;                  // a viewer came while its frame rested; not shown since
     bool was_refused;              // it has not lit the room, and a frame of it could not
     struct gn_environment_job job; // where has_frame
     uint64_t turn;                 // when its last frame was taken
@@ -92,9 +94,15 @@ void gn_probes_refuse(struct gn_probes *probes, uint64_t session_id, struct gn_w
 struct gn_lighting_state *gn_probes_replace_light(struct gn_probes *probes,
                                                   const struct gn_lighting_state *old,
                                                   struct gn_lighting_state *light);
-/** The session has ended. Where other probes have lit the room all of it goes, to *out_old (else
- * zeroed); where not, its frame and light stay. */
+/** The session has ended. Where probes that are still there have lit the room all of it goes, to
+ * *out_old (else zeroed); where not, its light stays, or the frame that is to give light. */
 void gn_probes_leave(struct gn_probes *probes, uint64_t session_id, struct gn_probe *out_old);
+/** A viewer has come after a time without: the frames that rest now are owed to it. */
+void gn_probes_owe(struct gn_probes *probes);
+/** The probe's light is shown. */
+void gn_probes_settle(struct gn_probes *probes, uint64_t session_id);
+/** True while a frame that is owed gave no light and was not refused. */
+bool gn_probes_is_owing(const struct gn_probes *probes);
 /** The session that began last of those that light the room or still may: whose frames were
  * refused counts from when it lights the room. 0: none. */
 uint64_t gn_probes_get_newest(const struct gn_probes *probes);

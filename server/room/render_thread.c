@@ -45,7 +45,8 @@ static bool wait_for_turn(struct gn_room *room, struct turn *out)
     gn_mutex_lock(&room->mu);
     while (!room->is_stopping) {
         int64_t now_ns = gn_clock_get_monotonic_ns(), deadline_ns;
-        struct gn_scheduler_light light = {room->light != NULL, get_light_sequence_locked(room)};
+        struct gn_scheduler_light light = {room->light != NULL, get_light_sequence_locked(room),
+                                           gn_probes_is_owing(&room->probes)};
         out->verdict = gn_scheduler_take(room->scheduler, now_ns, light, &out->job, &deadline_ns);
         if (out->verdict != GN_SCHEDULER_NOTHING) {
             out->light = room->light ? gn_lighting_state_ref(room->light) : NULL;

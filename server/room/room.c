@@ -167,7 +167,8 @@ int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
     if (!is_full) {
         s->next = room->sessions;
         room->sessions = s;
-        room->n_viewers += s->role == GN_MSG_ROLE_VIEWER;
+        if (s->role == GN_MSG_ROLE_VIEWER && room->n_viewers++ == 0)
+            gn_probes_owe(&room->probes);
         room->n_probes += s->role == GN_MSG_ROLE_PROBE;
         room->n_screens += s->role == GN_MSG_ROLE_SCREEN;
         room->n_subscribers += s->want_lighting_states;

@@ -35,8 +35,8 @@ void gn_worked_frame_finish(struct gn_worked_frame *worked);
 /**
  * True where all but sequence, capture time and exposure time agree and each texel's channels do:
  * the linear value that the response gives them differs by at most noise [0, 0.1] of what it was
- * (before the matrix). Of floats, half floats, 12-bit and 16-bit codes only; RGB8, JPEG and EXR, and
- * all formats at noise 0, must agree to the byte. Where there is no memory the answer is false.
+ * (before the matrix). Of floats, half floats, 12-bit and 16-bit codes only; RGB8, JPEG and EXR,
+ * and all formats at noise 0, must agree to the byte. Where there is no memory the answer is false.
  */
 bool gn_worked_frame_is_same(struct gn_worked_frame *worked, const struct gn_environment_job *job,
                              double noise);

@@ -76,7 +76,8 @@ enum gn_scheduler_verdict gn_scheduler_take(struct gn_scheduler *scheduler, int6
             continue;
         const struct gn_msg_frame *frame = &s->job.frame;
         int64_t deadline_ns = s->job.received_ns + (int64_t)frame->lighting_wait_ms * 1000000;
-        bool is_lit = light.is_there && light.sequence >= frame->lighting_min_sequence;
+        bool is_lit =
+            light.is_there && !light.is_behind && light.sequence >= frame->lighting_min_sequence;
         if (!is_lit && now_ns < deadline_ns) {
             if (deadline_ns < first_deadline_ns)
                 first_deadline_ns = deadline_ns;

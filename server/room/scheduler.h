@@ -37,6 +37,7 @@ enum gn_scheduler_verdict {
 struct gn_scheduler_light {
     bool is_there;
     uint64_t sequence;
+    bool is_behind; // a newer one is on its way, of a frame that rested while nobody looked
 };
 
 /** Thread-safety: unsafe. */

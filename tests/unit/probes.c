@@ -143,6 +143,66 @@ static void test_who_stays(void **state)
     assert_int_equal(count_lights(&probes), 0);
 }
 
+/* What a probe sent last lights the room though it has gone: it takes the place of what one left
+ * that went before. */
+static void test_who_sends_and_goes(void **state)
+{
+    (void)state;
+    struct gn_probes probes = {0};
+    assert_int_equal(put(&probes, 1, 1), 0);
+    assert_int_equal(take(&probes, true), 101);
+    set_light(&probes, 1, true, 0);
+    assert_false(leave(&probes, 1));
+    assert_int_equal(put(&probes, 2, 1), 0);
+    assert_false(leave(&probes, 2)); // its frame waits
+    assert_int_equal(gn_probes_get_newest(&probes), 2);
+    assert_int_equal(take(&probes, false), 201);
+    assert_int_equal(gn_probes_get_newest(&probes), 2);
+    set_light(&probes, 2, true, 1); // the first one's goes
+    assert_int_equal(count_lights(&probes), 1);
+    assert_int_equal(put(&probes, 3, 1), 0);
+    assert_int_equal(take(&probes, true), 301);
+    assert_false(leave(&probes, 3)); // it is worked on
+    set_light(&probes, 3, true, 1);
+    assert_int_equal(put(&probes, 4, 1), 0);
+    assert_int_equal(take(&probes, true), 401);
+    assert_false(leave(&probes, 4));
+    refuse(&probes, 4); // of no use: the light that is there stays
+    assert_int_equal(gn_probes_get_newest(&probes), 3);
+    assert_int_equal(count_lights(&probes), 1);
+    for (uint64_t id = 11; id < 11 + GN_PROBES_MAX - 1; id++)
+        assert_int_equal(put(&probes, id, 1), 0);
+    gn_probes_finish(&probes);
+}
+
+/* Frames that rested when a viewer came are waited for, later ones are not. */
+static void test_what_is_owed(void **state)
+{
+    (void)state;
+    struct gn_probes probes = {0};
+    gn_probes_owe(&probes);
+    assert_false(gn_probes_is_owing(&probes));
+    for (uint64_t id = 1; id <= 3; id++)
+        assert_int_equal(put(&probes, id, 1), 0);
+    gn_probes_owe(&probes);
+    assert_int_equal(put(&probes, 4, 1), 0);
+    for (uint64_t id = 1; id <= 3; id++) {
+        assert_true(gn_probes_is_owing(&probes));
+        assert_int_equal(take(&probes, true), 100 * id + 1);
+        if (id == 1) {
+            set_light(&probes, id, true, 0);
+            assert_true(gn_probes_is_owing(&probes)); // not shown yet
+            gn_probes_settle(&probes, id);
+        } else if (id == 2) {
+            refuse(&probes, id);
+        } else {
+            assert_false(leave(&probes, id)); // one that is still there lights the room
+        }
+    }
+    assert_false(gn_probes_is_owing(&probes));
+    gn_probes_finish(&probes);
+}
+
 /* Slots are for who lights the room, or may: not for who was only ever refused. */
 static void test_who_makes_room(void **state)
 {
@@ -259,8 +319,12 @@ static void test_worked_frames(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_in_turn),        cmocka_unit_test(test_who_stays),
-        cmocka_unit_test(test_who_makes_room), cmocka_unit_test(test_who_is_newest),
+        cmocka_unit_test(test_in_turn),
+        cmocka_unit_test(test_who_stays),
+        cmocka_unit_test(test_who_sends_and_goes),
+        cmocka_unit_test(test_what_is_owed),
+        cmocka_unit_test(test_who_makes_room),
+        cmocka_unit_test(test_who_is_newest),
         cmocka_unit_test(test_worked_frames),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -30,7 +30,7 @@ struct house {
     struct gn_room_session *probe, *viewer, *subscriber;
     uint64_t next_id, frame_id, sequence;
     int64_t time_ns;
-    double gain; // of all light
+    double gain;           // of all light
     struct gn_note *notes; // taken from the mailbox, not read
 };
 

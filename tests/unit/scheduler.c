@@ -13,11 +13,11 @@
 
 #define MS INT64_C(1000000)
 
-static const struct gn_scheduler_light dark = {false, 0};
+static const struct gn_scheduler_light dark = {.is_there = false};
 
 static struct gn_scheduler_light lit(uint64_t sequence)
 {
-    return (struct gn_scheduler_light){true, sequence};
+    return (struct gn_scheduler_light){.is_there = true, .sequence = sequence};
 }
 
 static struct gn_frame_job make_job(uint64_t id, int64_t received_ns, uint64_t min_sequence,
@@ -111,6 +111,21 @@ static void test_wait(void **state)
     assert_int_equal(take(s, 201 * MS, lit(5), GN_SCHEDULER_RENDER), 3);
 }
 
+/* Light that is about to be replaced is waited for as if there were none. */
+static void test_light_behind(void **state)
+{
+    struct gn_scheduler *s = *state;
+    struct gn_frame_job old;
+    struct gn_scheduler_light behind = {.is_there = true, .sequence = 7, .is_behind = true};
+    int slot = gn_scheduler_add(s);
+    struct gn_frame_job job = make_job(1, 0, 0, 10);
+    (void)gn_scheduler_put(s, slot, &job, &old);
+    take(s, 9 * MS, behind, GN_SCHEDULER_NOTHING);
+    assert_int_equal(take(s, 9 * MS, lit(7), GN_SCHEDULER_RENDER), 1);
+    (void)gn_scheduler_put(s, slot, &job, &old);
+    assert_int_equal(take(s, 10 * MS, behind, GN_SCHEDULER_RENDER), 1);
+}
+
 static void test_no_light(void **state)
 {
     struct gn_scheduler *s = *state;
@@ -146,6 +161,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_latest_wins, setup, teardown),
         cmocka_unit_test_setup_teardown(test_turns, setup, teardown),
         cmocka_unit_test_setup_teardown(test_wait, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_light_behind, setup, teardown),
         cmocka_unit_test_setup_teardown(test_no_light, setup, teardown),
         cmocka_unit_test_setup_teardown(test_slots, setup, teardown),
     };
