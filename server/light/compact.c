@@ -220,8 +220,10 @@ int gn_compact_find(const struct gn_radiance_map *map, const struct gn_compact_o
         struct gn_compact_light light;
         if (!peak || peak->luminance < mean)
             break;
-        if (find_spot(&s, peak, &light))
+        if (find_spot(&s, peak, &light)) {
+            light.share = light.energy / get_total_energy(map);
             rc = keep_spot(&s, &light, out_lights);
+        }
         gather(&s, peak, 0); // what is left about it is its glow, or a larger lamp
         for (int k = 0; k < s.n_members; k++)
             s.candidates[s.members[k]].is_done = true;

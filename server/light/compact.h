@@ -28,6 +28,7 @@ struct gn_compact_light {
     double angular_radius; // rad, of the disc of even radiance that is as spread out
     double irradiance[3];  // RGB at normal incidence, W/m^2: sum of (L - background) dOmega, >= 0
     double energy;         // luminance of that
+    double share;          // of the map's and the fill's sum of Y dOmega
     double solid_angle;    // sr, of its texels
     float background[3];   // radiance of the texels around it, at most its own mean
     int first, n;          // its texels in the list

@@ -11,9 +11,10 @@
 #include "server/light/lights.h"
 
 /**
- * Adds the map's compact lights to the list (compact.h, its defaults; a disc of the stream's last
- * state, previous, may be a tenth wider and a fifth weaker, and keeps its identity). *out_rest is
- * what they leave, the caller's; NULL: there are none. Returns 0 or -ENOMEM.
+ * Adds the map's compact lights (compact.h) of up to 0.0175 rad and from a share of 0.05 on to the
+ * list; one where the stream's last state, previous, had a disc may be a tenth wider and a fifth
+ * weaker, and keeps its identity. *out_rest is what they leave, the caller's; NULL: there are none.
+ * Returns 0 or -ENOMEM.
  */
 GN_MUST_USE int gn_discs_take(const struct gn_radiance_map *map,
                               const struct gn_lighting_state *previous, struct gn_pool *pool,

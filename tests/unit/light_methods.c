@@ -410,6 +410,67 @@ static void any_times_may_be_given(void **unused)
     assert_true(gn_light_get_share(&back) == 0);
 }
 
+/* A lamp towards +x with a share of the energy, as wide; and the sky of radiance 1 about it. With a
+ * sun, a texel with a fifth of the sky's energy elsewhere. */
+static struct gn_lighting_state *light_lamp(double share, double radius, bool has_sun,
+                                            struct gn_lighting_state *previous)
+{
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 2048, 1024), 0);
+    light_fixture_fill(&f, light_fixture_constant);
+    const struct gn_projection *p = &f.frame.projection;
+    double sky = 4 * pi * (double)f.image.data[0], sun = has_sun ? 0.2 * sky : 0, omega = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        double excess = share / (1 - share) * (sky + sun) / omega; // pass 1
+        for (int i = 0; i < p->width * p->height; i++) {
+            double d[3];
+            int x = i % p->width, y = i / p->width;
+            if (!gn_projection_get_direction(p, x + 0.5, y + 0.5, d) || d[0] < cos(radius))
+                continue;
+            omega += pass == 0 ? gn_projection_get_solid_angle(p, x, y) : 0;
+            for (int c = 0; c < 3 && pass == 1; c++)
+                gn_image_at(&f.image, x, y)[c] += (float)excess;
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        gn_image_at(&f.image, 80, 240)[c] +=
+            (float)(sun / gn_projection_get_solid_angle(p, 80, 240));
+    struct gn_lighting_state *state = make_state(&f, GN_LIGHT_MEDIAN_CUT, 8, previous, NULL);
+    light_fixture_finish(&f);
+    return state;
+}
+
+/* Each disc has a hysteresis of its own: a sun elsewhere makes no disc of a weak or wide spot. */
+static void a_spot_in_between_is_a_disc_only_where_one_was(void **unused)
+{
+    (void)unused;
+    static const struct {
+        double share, radius;
+        bool is_fresh, is_kept;
+    } cases[] = {
+        {0.051, 0.012, true, true},   {0.049, 0.012, false, true}, {0.041, 0.012, false, true},
+        {0.039, 0.012, false, false}, {0.2, 0.0165, true, true},   {0.2, 0.0182, false, true},
+        {0.2, 0.0205, false, false},
+    };
+    struct gn_lighting_state *before[3] = {
+        light_lamp(0, 0.012, false, NULL), light_lamp(0, 0.012, true, NULL),
+        light_lamp(0.1, 0.012, true, NULL)}; // nothing, a sun, a sun and the lamp
+    for (int k = 0; k < 3; k++)
+        assert_int_equal(before[k]->figures.n_discs, k);
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        for (int k = 0; k < 3; k++) {
+            struct gn_lighting_state *state =
+                light_lamp(cases[i].share, cases[i].radius, k > 0, before[k]);
+            bool is_disc = k == 2 ? cases[i].is_kept : cases[i].is_fresh;
+            if (state->figures.n_discs != (k > 0) + is_disc)
+                fail_msg("case %zu after %d discs: %d discs", i, k, state->figures.n_discs);
+            gn_lighting_state_unref(&state);
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        gn_lighting_state_unref(&before[k]);
+}
+
 static void two_lamps(const double dir[static 3], float out[static 3])
 {
     float v = 0.01f;
@@ -450,6 +511,7 @@ int main(void)
         cmocka_unit_test(quadtree_is_calm_in_noise),
         cmocka_unit_test(quadtree_comes_back_to_its_number),
         cmocka_unit_test(any_times_may_be_given),
+        cmocka_unit_test(a_spot_in_between_is_a_disc_only_where_one_was),
         cmocka_unit_test(inversion_spreads_evenly),
         cmocka_unit_test(inversion_keeps_identities),
     };
