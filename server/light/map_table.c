@@ -265,7 +265,8 @@ static int fill_table(struct gn_map_table *t, const struct gn_map_table *previou
     }
     fill_matrix(t);
     gn_pool_run(pool, t->projection.height, rotate_row, t);
-    if (gn_map_table_bound_blocks(t, pool) < 0 || find_spans(t) < 0 || make_gain(t) < 0 || list_rim(t) < 0)
+    if (gn_map_table_bound_blocks(t, pool) < 0 || find_spans(t) < 0 || make_gain(t) < 0 ||
+        list_rim(t) < 0)
         return -ENOMEM;
     sum_solid_angles(t);
     return make_weights(t);
