@@ -94,8 +94,10 @@ def collect(rig, render, rig_folder, out, name):
                 "error_with_bounces": {k: bounced[stem][k] for k in ("object", "shadow")}}
         item["is_in_step"] = item["receipt"]["lighting_sequence"] == item["environment_frame"]
         if i in shown:
-            item["same_as_gnomon_render"] = render_offline(
-                render, folder, sequence, frame, out, os.path.join(composites, stem + ".png"))
+            is_same = render_offline(render, folder, sequence, frame, out,
+                                     os.path.join(composites, stem + ".png"))
+            if i == 0:  # the lights of later frames go on from those before
+                item["same_as_gnomon_render"] = is_same
         frames.append(item)
     return frames
 

@@ -122,6 +122,8 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
         return rc;
     int64_t start_ns = gn_clock_get_monotonic_ns();
     struct gn_light_list list = {0};
+    // Another stream's tables serve, but its lights and decisions are none of this one's.
+    bool goes_on = options->previous && options->previous->stream == options->stream;
     gn_partition_plan_unref(&state->plan);
     gn_light_memory_unref(&state->memory);
     free(state->lights);
@@ -134,7 +136,7 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
                                       &state->plan);
     if (rc == 0) {
         memcpy(&state->memory->settings, &settings, sizeof(settings));
-        rc = make_from_rest(state, &settings, options->previous, pool, &list);
+        rc = make_from_rest(state, &settings, goes_on ? options->previous : NULL, pool, &list);
     }
     if (rc == 0)
         rc = take_lights(state, &list);

@@ -267,6 +267,31 @@ static void the_number_follows_in_time(void **unused)
     light_fixture_finish(&f);
 }
 
+/* A stream's first light depends on no other stream's, by any method. */
+static void another_stream_is_forgotten(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 150, 150);
+    for (int method = 0; method < GN_LIGHT_METHOD_COUNT; method++) {
+        struct gn_light_options options = {.method = (enum gn_light_method)method, .stream = 1};
+        struct gn_lighting_state *other = make_state(&f, &options, NULL);
+        set_lamp(&f, 0.7f);
+        options.stream = 2;
+        struct gn_lighting_state *fresh = make_state(&f, &options, NULL);
+        options.previous = other;
+        struct gn_lighting_state *second = make_state(&f, &options, NULL);
+        assert_int_equal(second->n_lights, fresh->n_lights);
+        for (int i = 0; i < fresh->n_lights; i++)
+            assert_true(light_fixture_is_same(&second->lights[i], &fresh->lights[i]));
+        gn_lighting_state_unref(&other);
+        gn_lighting_state_unref(&fresh);
+        gn_lighting_state_unref(&second);
+        set_lamp(&f, 20);
+    }
+    light_fixture_finish(&f);
+}
+
 static void names_are_unique(void **unused)
 {
     (void)unused;
@@ -323,6 +348,7 @@ int main(void)
         cmocka_unit_test(noise_turns_no_region),
         cmocka_unit_test(a_region_is_cut_with_hysteresis),
         cmocka_unit_test(the_number_follows_in_time),
+        cmocka_unit_test(another_stream_is_forgotten),
         cmocka_unit_test(names_are_unique),
         cmocka_unit_test(threads_do_not_matter),
     };
