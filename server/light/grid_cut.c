@@ -35,6 +35,7 @@ struct cutting {
     const struct gn_grid *grid;
     const struct gn_grid_cutter *cutter;
     double (*table)[4]; // [side + 1][side + 1], owned: sums over the cells above and to the left
+    double floor;       // what the table's rounding leaves of darkness is no more: no energy
     int n;
     struct region *regions; // [n_aim], owned
     int n_items, items_capacity;
@@ -63,6 +64,7 @@ static int make_table(struct cutting *c)
                 out[x + 1][k] = above[x + 1][k] + row[k];
         }
     }
+    c->floor = 1e-12 * c->table[side * pitch + side][0];
     return 0;
 }
 
@@ -85,9 +87,7 @@ static double get_cost(const struct cutting *c, const struct region *r, int axis
     high[axis] = low[axis] = at;
     look_up(c, r->low, high, near);
     look_up(c, low, r->high, far);
-    // What the table's rounding leaves of darkness beside a sun is no energy.
-    double floor = 1e-12 * (near[0] + far[0]);
-    return near[0] > floor && far[0] > floor ? c->cutter->get_cost(near, far) : INFINITY;
+    return near[0] > c->floor && far[0] > c->floor ? c->cutter->get_cost(near, far) : INFINITY;
 }
 
 static double get_angle(const struct gn_grid *grid, const double from[static 2],
@@ -259,29 +259,37 @@ static int open_cells(struct cutting *c, struct region *r)
     return 0;
 }
 
-/* Draws the rectangle in to its lit cells. */
+/* Drops the rectangle's first or last column (axis 0) or row, where it has no energy. */
+static bool drop_border(const struct cutting *c, struct region *r, int axis, bool is_far)
+{
+    int low[2] = {r->low[0], r->low[1]}, high[2] = {r->high[0], r->high[1]};
+    if (high[axis] - low[axis] <= 1)
+        return false;
+    if (is_far)
+        low[axis] = high[axis] - 1;
+    else
+        high[axis] = low[axis] + 1;
+    double sum = 0;
+    for (int y = low[1]; y < high[1] && sum <= c->floor; y++)
+        for (int x = low[0]; x < high[0] && sum <= c->floor; x++)
+            sum += c->grid->cell[y * c->grid->side + x].energy;
+    if (sum > c->floor)
+        return false;
+    if (is_far)
+        r->high[axis]--;
+    else
+        r->low[axis]++;
+    return true;
+}
+
+/* Draws the rectangle in to its lit cells: a cut behind any border is a possible one then. */
 static void shrink(const struct cutting *c, struct region *r)
 {
-    for (int axis = 0; axis < 2; axis++) {
-        for (int is_far = 0; is_far < 2; is_far++) {
-            while (r->high[axis] - r->low[axis] > 1) {
-                int low[2] = {r->low[0], r->low[1]}, high[2] = {r->high[0], r->high[1]};
-                if (is_far)
-                    low[axis] = high[axis] - 1;
-                else
-                    high[axis] = low[axis] + 1;
-                bool is_lit = false;
-                for (int y = low[1]; y < high[1] && !is_lit; y++)
-                    for (int x = low[0]; x < high[0] && !is_lit; x++)
-                        is_lit = c->grid->cell[y * c->grid->side + x].energy > 0;
-                if (is_lit)
-                    break;
-                if (is_far)
-                    r->high[axis]--;
-                else
-                    r->low[axis]++;
-            }
-        }
+    for (bool is_drawn = true; is_drawn;) {
+        is_drawn = false;
+        for (int side = 0; side < 4; side++)
+            while (drop_border(c, r, side / 2, side % 2))
+                is_drawn = true;
     }
 }
 

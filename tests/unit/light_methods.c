@@ -497,6 +497,38 @@ static void variance_keeps_a_lamp_whole(void **unused)
     light_fixture_finish(&f);
 }
 
+static float faint;
+
+static void lamp_over_faint(const double dir[static 3], float out[static 3])
+{
+    out[0] = out[1] = out[2] = dir[2] > cos(1.2 * pi / 180) ? 1 : faint;
+}
+
+/* What the grid's sums cannot tell from darkness must not keep a lamp of few cells and many texels
+ * from being cut. */
+static void cuts_reach_a_lamp_over_faint_light(void **unused)
+{
+    (void)unused;
+    static const float backgrounds[] = {0, 1e-30f, 1e-18f, 1e-9f};
+    static const enum gn_light_method cutting[] = {GN_LIGHT_MEDIAN_CUT, GN_LIGHT_VARIANCE};
+    for (size_t i = 0; i < 8; i++) {
+        struct light_fixture f;
+        struct gn_lighting_state *state = NULL;
+        struct gn_error error = {0};
+        const struct gn_light_options options = {
+            .method = cutting[i % 2], .n_lights = 16, .no_sh = true, .no_discs = true};
+        faint = backgrounds[i / 2];
+        assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
+        light_fixture_fill(&f, lamp_over_faint);
+        if (gn_lighting_state_create(&f.frame, NULL, &options, NULL, &state, &error) < 0)
+            fail_msg("%s", error.text);
+        assert_int_equal(state->n_lights, 16);
+        check_lights(state);
+        gn_lighting_state_unref(&state);
+        light_fixture_finish(&f);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -506,6 +538,7 @@ int main(void)
         cmocka_unit_test(every_method_gives_one_texel_its_share),
         cmocka_unit_test(every_method_has_the_same_bits_on_threads),
         cmocka_unit_test(median_cut_halves_energy),
+        cmocka_unit_test(cuts_reach_a_lamp_over_faint_light),
         cmocka_unit_test(variance_keeps_a_lamp_whole),
         cmocka_unit_test(quadtree_leaves_the_others_where_they_were),
         cmocka_unit_test(quadtree_is_calm_in_noise),
