@@ -10,16 +10,15 @@
 #include "server/light/luminance.h"
 #include "server/light/map_table.h"
 
-/* The sums over the texels about one: a single texel's colour is noise. */
+/* The sums over the texels about one, as the sphere goes on: a single texel's colour is noise. */
 static void sum_neighbours(const struct gn_radiance_map *map, uint32_t texel,
                            struct gn_patch *out_sum)
 {
-    int width = map->radiance.width, height = map->radiance.height;
-    int x = (int)(texel % (uint32_t)width), y = (int)(texel / (uint32_t)width);
+    uint32_t width = (uint32_t)map->radiance.width;
     for (int i = 0; i < 9; i++) {
-        int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
-        if (nx >= 0 && nx < width && ny >= 0 && ny < height)
-            gn_patch_add_texel(out_sum, map, (uint32_t)ny * (uint32_t)width + (uint32_t)nx);
+        int xy[2] = {(int)(texel % width), (int)(texel / width)};
+        if (gn_projection_step(&map->table->projection, i % 3 - 1, i / 3 - 1, xy))
+            gn_patch_add_texel(out_sum, map, (uint32_t)xy[1] * width + (uint32_t)xy[0]);
     }
 }
 

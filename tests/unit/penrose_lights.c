@@ -303,6 +303,51 @@ static void the_number_comes_back_in_time(void **unused)
     }
 }
 
+/* The rows are one below the other in the picture, and far apart on the sphere. */
+static void equal_lights_keep_their_colours_across_a_cube_s_faces(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_CUBE, 64, 0), 0);
+    f.frame.codes = &f.image;
+    gn_image_at(&f.image, 20, 63)[0] = 1 / 0.2126f; // of equal luminance
+    gn_image_at(&f.image, 20, 64)[2] = 1 / 0.0722f;
+    struct gn_light_options options = {
+        .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_EQUAL, .n_lights = 64, .no_discs = true};
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    int n_red = 0, n_blue = 0;
+    for (int i = 0; i < state->n_lights; i++) {
+        const float *e = state->lights[i].irradiance;
+        n_red += e[0] > 0 && e[2] == 0;
+        n_blue += e[2] > 0 && e[0] == 0;
+    }
+    assert_true(n_red > 0 && n_blue > 0);
+    assert_int_equal(n_red + n_blue, state->n_lights);
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
+/* Either side of a lat-long's seam is beside the other. */
+static void equal_lights_see_over_a_seam(void **unused)
+{
+    (void)unused;
+    struct light_fixture f;
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 128, 64), 0);
+    f.frame.codes = &f.image;
+    gn_image_at(&f.image, 0, 30)[0] = 1 / 0.2126f;
+    gn_image_at(&f.image, 127, 30)[2] = 1 / 0.0722f;
+    struct gn_light_options options = {
+        .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_EQUAL, .n_lights = 64, .no_discs = true};
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    assert_true(state->n_lights > 0);
+    for (int i = 0; i < state->n_lights; i++) {
+        const float *e = state->lights[i].irradiance;
+        assert_true(e[0] > 0 && e[2] > 0);
+    }
+    gn_lighting_state_unref(&state);
+    light_fixture_finish(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -313,6 +358,8 @@ int main(void)
         cmocka_unit_test(a_blinking_lamp_moves_no_other_sample),
         cmocka_unit_test(noise_bears_no_samples),
         cmocka_unit_test(the_number_comes_back_in_time),
+        cmocka_unit_test(equal_lights_keep_their_colours_across_a_cube_s_faces),
+        cmocka_unit_test(equal_lights_see_over_a_seam),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
