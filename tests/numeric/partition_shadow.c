@@ -167,8 +167,9 @@ static double compare(const char *name,
             struct gn_light_options options = {.n_lights = wanted};
             energy = measure(&f, &options, &n_energy); // the fill's, from below, do not count
         }
-        print_message("%-9s maxLS %2d: literal %.4f with %3d lights, energy %.4f with %3d: %.1f\n",
-                      name, max_ls, literal, n_seed, energy, n_energy, literal / energy);
+        print_message(
+            "# %-9s maxLS %2d: literal %.4f with %3d lights, energy %.4f with %3d: %.1f\n", name,
+            max_ls, literal, n_seed, energy, n_energy, literal / energy);
         if (max_ls > 1)
             worst = fmin(worst, literal / energy);
     }
@@ -176,7 +177,7 @@ static double compare(const char *name,
         struct gn_light_options options = {.n_lights = n};
         int n_lights;
         double rmse = measure(&f, &options, &n_lights);
-        print_message("%-9s energy %.4f with %3d\n", name, rmse, n_lights);
+        print_message("# %-9s energy %.4f with %3d\n", name, rmse, n_lights);
     }
     light_fixture_finish(&f);
     return worst;

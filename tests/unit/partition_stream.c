@@ -178,7 +178,7 @@ static void noise_turns_no_region(void **unused)
             n_changes += count_new(before, state) + count_new(state, before);
             gn_lighting_state_unref(&before);
         }
-        print_message("births and deaths in 30 frames: %d\n", n_changes);
+        print_message("# births and deaths in 30 frames: %d\n", n_changes);
         assert_true(n_changes < 3);
         gn_lighting_state_unref(&state);
         light_fixture_finish(&f);
@@ -252,7 +252,7 @@ static void the_number_follows_in_time(void **unused)
         assert_true(state->n_lights >= n_before && state->n_lights <= n_before + 0.1 * n);
         n_before = state->n_lights;
     }
-    print_message("%d lights, with darker lamps %d\n", n, n_before);
+    print_message("# %d lights, with darker lamps %d\n", n, n_before);
     assert_true(n_before >= 0.75 * 400 && n_before < 0.85 * 400);
     for (int i = 0; i < 3 * 150 * 150; i++)
         f.image.data[i] *= 0.01f;

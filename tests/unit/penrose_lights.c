@@ -267,7 +267,7 @@ static void noise_bears_no_samples(void **unused)
         n_changes += count_new(before, state) + count_new(state, before);
         gn_lighting_state_unref(&before);
     }
-    print_message("births and deaths in 40 frames: %d\n", n_changes);
+    print_message("# births and deaths in 40 frames: %d\n", n_changes);
     assert_true(n_changes < 4); // one in ten frames
     gn_lighting_state_unref(&state);
     light_fixture_finish(&f);

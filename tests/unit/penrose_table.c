@@ -100,7 +100,7 @@ static void the_table_lays_samples_out_evenly(void **unused)
         sum[1] += relaxed / GN_PENROSE_INDICES;
         sum[2] += measure(row, 1) / GN_PENROSE_INDICES;
     }
-    print_message("second moment: raw %.4f, relaxed %.4f, looked up a level too deep %.4f\n",
+    print_message("# second moment: raw %.4f, relaxed %.4f, looked up a level too deep %.4f\n",
                   sum[0], sum[1], sum[2]);
     assert_near(sum[1], 0.166, 0.001);
     assert_near(sum[0], 0.186, 0.002);
@@ -176,7 +176,7 @@ static void low_frequencies_are_missing(void **unused)
     measure(gn_penrose_table[10], 0);
     double mean = sqrt(even.n); // frequency of a square lattice of the density
     double low = get_power(3, 0.7 * mean), peak = get_power(0.9 * mean, 1.2 * mean);
-    print_message("power below 0.7 of the mean frequency %.3f, about it %.3f\n", low, peak);
+    print_message("# power below 0.7 of the mean frequency %.3f, about it %.3f\n", low, peak);
     assert_true(low < 0.1);
     assert_true(peak > 1);
 }

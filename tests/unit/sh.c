@@ -460,7 +460,7 @@ static void points_and_discs_err_as_known(void **unused)
         double radius = discs[i].radius_deg * pi / 180;
         double peak = 0.5 * (1 + cos(radius));
         struct errors e = judge_disc(2, radius);
-        print_message("disc %4.1f deg: order 2 off by %.4f of its peak, order 4 by %.4f\n",
+        print_message("# disc %4.1f deg: order 2 off by %.4f of its peak, order 4 by %.4f\n",
                       discs[i].radius_deg, e.worst / peak, judge_disc(4, radius).worst / peak);
         assert_near(e.worst / peak, discs[i].worst, 1.5e-3);
     }
@@ -501,7 +501,7 @@ static void dering_is_the_smallest_window(void **unused)
             assert_near(1 / (1 + 36 * irradiance.lambda), 0.135, 1e-3);
         }
         double low = get_low(&irradiance), e[3];
-        print_message("order %d: lambda %.4f, lowest %.2g\n", order, irradiance.lambda, low);
+        print_message("# order %d: lambda %.4f, lowest %.2g\n", order, irradiance.lambda, low);
         assert_true(low >= -1e-6 && low < 1e-3);
         gn_irradiance_get(&irradiance, dir, e);
         if (order == 2)
@@ -600,7 +600,7 @@ static void check_rounding(struct light_fixture *f)
     for (int k = 0; k < GN_SH_MAX; k++)
         for (int c = 0; c < 3; c++)
             worst = fmax(worst, fabs(sh[k][c] - sum[k][c]) / sum[0][c]);
-    print_message("%s %dx%d: off by %.2g of L00\n", gn_projection_get_name(map->projection.type),
+    print_message("# %s %dx%d: off by %.2g of L00\n", gn_projection_get_name(map->projection.type),
                   width, height, worst);
     assert_true(worst < 1e-6);
     gn_radiance_map_unref(&map);
