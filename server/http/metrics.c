@@ -179,7 +179,9 @@ static void put_probes(FILE *out, const struct gn_http_view *view, const struct 
             for (int p = 0; p < n; p++)
                 fprintf(out, "%s{%s,session=\"%llu\"} %.9g\n", heads[m].name, samples[i].label,
                         (unsigned long long)probes[p].session_id,
-                        m == 0 ? (double)(gn_clock_get_monotonic_ns() - probes[p].capture_ns) * 1e-9
+                        m == 0 ? gn_clock_get_ms_between(probes[p].capture_ns,
+                                                         gn_clock_get_monotonic_ns()) *
+                                     1e-3
                                : (double)probes[p].n_lit);
         }
     }

@@ -321,7 +321,8 @@ static void sum_lights(const struct frame *frame, const struct scratch *scratch,
 /** Nothing is hidden, or cut. */
 static void clear_masks(const struct frame *frame, uint16_t *texels, uint8_t *places)
 {
-    memset(texels, 0, (size_t)frame->lights->n / LANES * sizeof(*texels));
+    if (frame->lights->n > 0) // else there may be no memory for them
+        memset(texels, 0, (size_t)frame->lights->n / LANES * sizeof(*texels));
     if (frame->places->n > 0)
         memset(places, 0, (size_t)frame->places->n);
 }
