@@ -379,12 +379,15 @@ static int cut_all(struct cutting *c, int n_aim)
     return 0;
 }
 
-int gn_grid_cut(const struct gn_grid *grid, const struct gn_grid_cutter *cutter, int n_aim,
+int gn_grid_cut(const struct gn_light_input *input, const struct gn_grid_cutter *cutter,
                 struct gn_light_list *list)
 {
-    struct cutting c = {.grid = grid, .cutter = cutter};
+    struct gn_grid grid;
+    struct cutting c = {.grid = &grid, .cutter = cutter};
+    int n_aim = input->settings->n_aim, rc = gn_grid_init(&grid, input);
     c.regions = malloc((size_t)n_aim * sizeof(*c.regions));
-    int rc = c.regions ? make_table(&c) : -ENOMEM;
+    if (rc == 0)
+        rc = c.regions ? make_table(&c) : -ENOMEM;
     if (rc == 0)
         rc = cut_all(&c, n_aim);
     for (int i = 0; i < c.n && rc == 0; i++) {
@@ -392,7 +395,7 @@ int gn_grid_cut(const struct gn_grid *grid, const struct gn_grid_cutter *cutter,
         struct gn_grid_cell sum = {0};
         struct gn_light light;
         if (r->n_items == 0)
-            sum = gn_grid_sum(grid, r->low[0], r->low[1], r->high[0], r->high[1]);
+            sum = gn_grid_sum(&grid, r->low[0], r->low[1], r->high[0], r->high[1]);
         for (int k = 0; k < r->n_items; k++)
             gn_grid_cell_add(&sum, &c.items[r->first_item + k]);
         if (!gn_grid_cell_get_light(&sum, &light)) // all is black
@@ -403,5 +406,6 @@ int gn_grid_cut(const struct gn_grid *grid, const struct gn_grid_cutter *cutter,
     free(c.table);
     free(c.regions);
     free(c.items);
+    gn_grid_finish(&grid);
     return rc;
 }

@@ -20,10 +20,10 @@ struct gn_grid_cutter {
 };
 
 /**
- * Adds n_aim lights to the list: fewer only where there are not as many texels with more than 1e-12
- * of the energy. Ids are those of the cuts that led to a region. 0 or -ENOMEM.
+ * Adds the lights that are aimed at to the list: fewer only where there are not as many texels with
+ * more than 1e-12 of the energy. Ids are those of the cuts that led to a region. 0 or -ENOMEM.
  */
-GN_MUST_USE int gn_grid_cut(const struct gn_grid *grid, const struct gn_grid_cutter *cutter,
-                            int n_aim, struct gn_light_list *list);
+GN_MUST_USE int gn_grid_cut(const struct gn_light_input *input, const struct gn_grid_cutter *cutter,
+                            struct gn_light_list *list);
 
 #endif

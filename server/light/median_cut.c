@@ -2,8 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * Median cut: the region with the most energy is cut across its longer side into halves of equal
- * energy, until there are enough. Where halves are exact, that is level by level, and 2^n lights
- * are those of Debevec, "A Median Cut Algorithm for Light Probe Sampling", 2005.
+ * energy, until there are enough. After Debevec, "A Median Cut Algorithm for Light Probe Sampling",
+ * 2005, who cuts a lat-long map level by level; here it is the octahedral grid, any number.
  */
 #include <math.h>
 
@@ -24,10 +24,5 @@ int gn_median_cut_make_lights(const struct gn_light_input *input, struct gn_ligh
 {
     static const struct gn_grid_cutter cutter = {get_urgency, get_cost, .is_median = true};
     (void)figures;
-    struct gn_grid grid;
-    int rc = gn_grid_init(&grid, input);
-    if (rc == 0)
-        rc = gn_grid_cut(&grid, &cutter, input->settings->n_aim, list);
-    gn_grid_finish(&grid);
-    return rc;
+    return gn_grid_cut(input, &cutter, list);
 }

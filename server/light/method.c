@@ -6,13 +6,13 @@
 #include <string.h>
 
 static const struct gn_light_maker makers[GN_LIGHT_METHOD_COUNT] = {
-    [GN_LIGHT_PARTITION_ENERGY] = {"partition", true, gn_partition_make_lights},
-    [GN_LIGHT_PARTITION_SEED] = {"seed", false, gn_partition_make_lights},
-    [GN_LIGHT_PENROSE] = {"penrose", true, gn_penrose_make_lights},
-    [GN_LIGHT_MEDIAN_CUT] = {"median-cut", true, gn_median_cut_make_lights},
-    [GN_LIGHT_VARIANCE] = {"variance", true, gn_variance_make_lights},
-    [GN_LIGHT_INVERSION] = {"inversion", true, gn_inversion_make_lights},
-    [GN_LIGHT_QUADTREE] = {"quadtree", true, gn_quadtree_make_lights},
+    [GN_LIGHT_PARTITION_ENERGY] = {"partition", gn_partition_make_lights},
+    [GN_LIGHT_PARTITION_SEED] = {"seed", gn_partition_make_lights},
+    [GN_LIGHT_PENROSE] = {"penrose", gn_penrose_make_lights},
+    [GN_LIGHT_MEDIAN_CUT] = {"median-cut", gn_median_cut_make_lights},
+    [GN_LIGHT_VARIANCE] = {"variance", gn_variance_make_lights},
+    [GN_LIGHT_INVERSION] = {"inversion", gn_inversion_make_lights},
+    [GN_LIGHT_QUADTREE] = {"quadtree", gn_quadtree_make_lights},
 };
 
 const struct gn_light_maker *gn_light_maker_get(enum gn_light_method method)

@@ -30,7 +30,6 @@ typedef int gn_light_make(const struct gn_light_input *input, struct gn_light_li
 /** One method. */
 struct gn_light_maker {
     const char *name;
-    bool has_aim; // the number of lights can be asked for
     gn_light_make *make;
 };
 

@@ -93,8 +93,8 @@ enum gn_light_weights {
 /** Options; all-zero is the default of the method. */
 struct gn_light_options {
     enum gn_light_method method;
-    int n_lights; // wanted number where the method can aim (energy with log2, Penrose),
-                  // [1, GN_LIGHTS_MAX] or GN_LIGHTS_NO_AIM; default 64
+    int n_lights; // wanted number (not by the paper's own metrics, nor seed), [1, GN_LIGHTS_MAX]
+                  // or GN_LIGHTS_NO_AIM; default 64
     int rings; // base division of a hemisphere, [1, 64]; default 8 (seed), else by n_lights: 4 for
                // 64 lights of a fisheye
     int sectors;   // [1, 256], rings * sectors <= 1024; default 3 rings

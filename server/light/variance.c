@@ -25,10 +25,5 @@ int gn_variance_make_lights(const struct gn_light_input *input, struct gn_light_
 {
     static const struct gn_grid_cutter cutter = {get_variance, get_cost, .is_median = false};
     (void)figures;
-    struct gn_grid grid;
-    int rc = gn_grid_init(&grid, input);
-    if (rc == 0)
-        rc = gn_grid_cut(&grid, &cutter, input->settings->n_aim, list);
-    gn_grid_finish(&grid);
-    return rc;
+    return gn_grid_cut(input, &cutter, list);
 }
