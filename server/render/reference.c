@@ -200,6 +200,8 @@ static bool find_hidden(const struct frame *frame, struct scratch *scratch, cons
     const struct light_list *lights = frame->lights;
     int n_blocks = lights->n / LANES;
     unsigned found = 0;
+    if (n_blocks == 0)
+        return false; /* no distant light, and no masks */
     int n_near = frame->cull ? find_near(frame, scratch, s, set) : 0;
     memset(masks, 0, (size_t)n_blocks * sizeof(*masks));
     if (frame->cull && n_near == 0)
