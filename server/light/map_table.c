@@ -287,6 +287,8 @@ int gn_map_table_create(const struct gn_projection *projection, const double rot
         return -ENOMEM;
     atomic_init(&t->references, 1);
     t->projection = *projection;
+    if (previous) // a stream that turns: its working memory goes along
+        atomic_init(&t->scratch, atomic_exchange(&previous->scratch, NULL));
     memcpy(t->rotation, rotation, sizeof(t->rotation));
     int rc = fill_table(t, previous, pool);
     if (rc < 0) {
@@ -312,6 +314,7 @@ void gn_map_table_unref(struct gn_map_table **table)
     struct gn_radiance_map *spare = atomic_load_explicit(&t->spare, memory_order_relaxed);
     if (spare)
         gn_radiance_map_free(spare);
+    gn_scratch_finish(&t->scratch);
     free(t->up_weight);
     free(t->own_weight);
     free(t->rim);

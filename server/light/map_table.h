@@ -14,14 +14,14 @@
 #include "common/pose.h"
 #include "common/projection.h"
 #include "proto/attr.h"
+#include "server/light/scratch.h"
 
 struct gn_radiance_map; // server/light/radiance_map.h
 
 /** Texels on a side of a block. */
 #define GN_MAP_BLOCK 8
 
-/** Thread-safety: immutable after create but for the spare map, which are atomic; shared (ref).
- */
+/** Thread-safety: immutable after create but for what is spare, which is atomic; shared (ref). */
 struct gn_map_table {
     _Atomic int references;
     struct gn_projection projection;
@@ -50,6 +50,7 @@ struct gn_map_table {
     double axis_world[3];       // optical axis; z of the frame of a whole sphere's picture
     _Atomic(struct gn_radiance_map *) spare; // a freed map, its pixels and rows, or NULL; taken by
                                              // the next one
+    gn_scratch_place scratch;                // working memory between frames
 };
 
 /**

@@ -7,6 +7,7 @@
 #define GN_SERVER_LIGHT_METHOD_H
 
 #include "server/light/lights.h"
+#include "server/light/scratch.h"
 
 /** What a method works from. Borrowed during the call. */
 struct gn_light_input {
@@ -16,6 +17,7 @@ struct gn_light_input {
     const struct gn_lighting_state *previous; // the stream's last state, or NULL
     const struct gn_light_memory *remembered; // of the last frame; NULL: of other settings, plan
     struct gn_light_memory *memory;           // for the next frame, zeroed: the method may fill it
+    struct gn_scratch *scratch;               // working memory, given back after the call
     struct gn_pool *pool;                     // may be NULL
 };
 

@@ -12,6 +12,7 @@
 #include "server/light/discs.h"
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
+#include "server/light/map_table.h"
 #include "server/light/method.h"
 #include "server/light/state_copy.h"
 #include "server/light/temporal.h"
@@ -101,9 +102,14 @@ static int make_from_rest(struct gn_lighting_state *state, struct gn_light_setti
                                          .previous = previous,
                                          .remembered = recall(state, previous),
                                          .memory = state->memory,
+                                         .scratch = gn_scratch_borrow(&state->map->table->scratch),
                                          .pool = pool};
     if (rc == 0)
-        rc = gn_light_maker_get(settings->method)->make(&input, list, &state->figures);
+        rc = input.scratch
+                 ? gn_light_maker_get(settings->method)->make(&input, list, &state->figures)
+                 : -ENOMEM;
+    struct gn_scratch *scratch = input.scratch;
+    gn_scratch_give_back(&state->map->table->scratch, &scratch);
     gn_radiance_map_unref(&rest);
     return rc;
 }
