@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * What the passes of one frame share. A frame goes through in tiles; a tile's samples go through in
- * batches: primary.c finds what each sees, shade.c and shadow.c (or reference.c for both) find its
- * light, refine.c says which pixels need more samples, layers.c makes pixels of samples.
+ * What the passes of one frame share. A frame goes through in tiles (tiles.c); a tile's samples go
+ * through in batches: primary.c finds what each sees, shade.c and shadow.c (or reference.c for both)
+ * find its light, refine.c says which pixels need more samples, layers.c makes pixels of samples.
  * A frame is const while the workers run; each worker owns one scratch. Sums are in double and in
  * the order of the lights, so the bits do not depend on the number of workers.
  */
@@ -264,6 +264,16 @@ struct frame {
     struct scratch *scratches;    // [n_workers]
     int tiles_x, tiles_y;
 };
+
+/* tiles.c */
+
+/** Fills the frame's layers, features and figures. */
+void gn_tiles_render(struct frame *frame, struct gn_pool *pool);
+
+/* report.c */
+
+/** What the workers counted, into the report; withdraws passes that found nothing to do. */
+void gn_report_fill(const struct frame *frame, int n_workers, struct gn_render_report *report);
 
 /* plan.c */
 

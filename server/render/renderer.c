@@ -1,9 +1,6 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-/*
- * The assembly: one frame in tiles on the pool. Two rounds with a wait between them: all centres,
- * then the pixels whose neighbourhood asks for more.
- */
+/* The assembly: memory that frames share, what a request may ask for, and the frame of it. */
 #include "server/render/internal.h"
 
 #include <assert.h>
@@ -200,184 +197,6 @@ static int check_request(const struct gn_scene *scene, const struct gn_camera *c
     return reason ? gn_error_set(out_error, -EINVAL, "%s", reason) : 0;
 }
 
-static void init_sample(const struct frame *frame, struct sample *sample, int x, int y, int part)
-{
-    uint64_t pixel = (uint64_t)y * (uint64_t)frame->camera->width + (uint64_t)x;
-    sample->seed =
-        (frame->options.seed + 1) * UINT64_C(0xd1342543de82ef95) ^ (pixel << 12) ^ (uint64_t)part;
-}
-
-/** What each of the n samples sees, and its light. */
-static void process_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
-                            struct tile_figures *figures)
-{
-    bool is_reference = frame->options.quality == GN_QUALITY_REFERENCE;
-    int64_t t0 = gn_clock_get_monotonic_ns();
-    gn_primary_trace(frame, scratch->samples, n, figures);
-    int64_t t1 = gn_clock_get_monotonic_ns();
-    gn_shade_follow_mirrors(frame, scratch->samples, n, figures);
-    gn_render_weigh_probes(frame, scratch->samples, n);
-    if (is_reference)
-        gn_reference_shade(frame, scratch, n, n_paths, figures);
-    else
-        gn_shade_samples(frame, scratch, n, figures);
-    if (!is_reference && frame->near.n > 0)
-        gn_near_shade(frame, scratch, n, figures);
-    int64_t t2 = gn_clock_get_monotonic_ns();
-    if (!frame->run_shadow) {
-        for (int i = 0; i < n; i++)
-            gn_shadow_clear(&scratch->samples[i]);
-    } else if (is_reference) {
-        gn_reference_shadow(frame, scratch, n, n_paths, figures);
-    } else {
-        gn_shadow_samples(frame, scratch, n, figures);
-    }
-    int64_t t3 = gn_clock_get_monotonic_ns();
-    figures->s_primary += 1e-9 * (double)(t1 - t0);
-    figures->s_shade += 1e-9 * (double)(t2 - t1);
-    figures->s_shadow += 1e-9 * (double)(t3 - t2);
-}
-
-/** The paper's ratio of one half of the lights, or of both (half 2). */
-static double get_factor(const struct frame *frame, const struct sample *s, int half, int k)
-{
-    double open = half == 2 ? s->open[0][k] + s->open[1][k] : s->open[half][k];
-    double cut = half == 2 ? s->cut[0][k] + s->cut[1][k] : s->cut[half][k];
-    return open > frame->floor_irradiance[k] ? 1 - cut / open : 1;
-}
-
-/** Half the difference of the halves has the variance of the whole, where lights are samples. */
-static void estimate_error(const struct frame *frame, const struct sample *s,
-                           struct tile_figures *figures)
-{
-    if (!s->is_cut)
-        return;
-    for (int k = 0; k < 3; k++) {
-        double e = 0.5 * (get_factor(frame, s, 0, k) - get_factor(frame, s, 1, k));
-        figures->error_sum += e * e;
-    }
-    figures->error_n += 3;
-}
-
-/** What the choice of pixels to refine looks at; without bounces, which are noisy. */
-static void keep_feature(const struct frame *frame, int x, int y, const struct sample *s)
-{
-    struct feature *feature =
-        &frame->features[(size_t)y * (size_t)frame->camera->width + (size_t)x];
-    bool is_virtual = s->kind == SAMPLE_VIRTUAL;
-    feature->owner = is_virtual ? s->object + 1 : 0;
-    for (int k = 0; k < 3; k++)
-        feature->color[k] = (float)(is_virtual  ? s->radiance[k] - s->indirect[k]
-                                    : s->is_cut ? get_factor(frame, s, 2, k)
-                                                : 1);
-}
-
-/** A tile's pixels, in squares of 4 x 4 so that a block of 16 receivers is compact. */
-static int list_pixels(const struct frame *frame, int item, int (*out_pixels)[2])
-{
-    int n = 0;
-    for (int i = 0; i < BATCH; i++) {
-        int square = i / 16;
-        int x = item % frame->tiles_x * TILE + square % 4 * 4 + i % 4;
-        int y = item / frame->tiles_x * TILE + square / 4 * 4 + i % 16 / 4;
-        if (x >= frame->camera->width || y >= frame->camera->height)
-            continue;
-        out_pixels[n][0] = x;
-        out_pixels[n++][1] = y;
-    }
-    return n;
-}
-
-static void render_centres(void *context, int item, int worker)
-{
-    const struct frame *frame = context;
-    struct scratch *scratch = &frame->scratches[worker];
-    struct tile_figures *figures = &frame->figures[item];
-    int pixels[BATCH][2];
-    int n = list_pixels(frame, item, pixels);
-    memset(figures, 0, sizeof(*figures));
-    for (int i = 0; i < n; i++) {
-        struct sample *s = &scratch->samples[i];
-        int x = pixels[i][0];
-        int y = pixels[i][1];
-        s->group = i;
-        init_sample(frame, s, x, y, 0);
-        gn_primary_aim(frame,
-                       frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
-    }
-    process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
-    for (int i = 0; i < n; i++) {
-        const struct sample *s = &scratch->samples[i];
-        int x = pixels[i][0];
-        int y = pixels[i][1];
-        *gn_image_at(&frame->layers->depth, x, y) = s->depth;
-        gn_layers_resolve(frame, x, y, s, 1);
-        keep_feature(frame, x, y, s);
-        if (frame->run_shadow)
-            estimate_error(frame, s, figures);
-    }
-}
-
-/** Does pixels[n][2] again with the grid. */
-static void refine_pixels(const struct frame *frame, struct scratch *scratch, int (*pixels)[2],
-                          int n, struct tile_figures *figures)
-{
-    int grid = frame->rule.grid;
-    int parts = grid * grid;
-    for (int i = 0; i < n * parts; i++) {
-        struct sample *s = &scratch->samples[i];
-        int x = pixels[i / parts][0];
-        int y = pixels[i / parts][1];
-        int part = i % parts;
-        int row = part / grid;
-        double dir[3];
-        s->group = i / parts;
-        init_sample(frame, s, x, y, 1 + part);
-        if (!gn_camera_get_ray(frame->camera, x + (part % grid + 0.5) / grid,
-                               y + (row + 0.5) / grid, dir))
-            dir[0] = dir[1] = dir[2] = 0;
-        const float narrow[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
-        gn_primary_aim(frame, narrow, s);
-    }
-    int n_paths = (frame->options.paths_per_pixel + parts - 1) / parts;
-    process_samples(frame, scratch, n * parts, n_paths, figures);
-    for (int i = 0; i < n; i++)
-        gn_layers_resolve(frame, pixels[i][0], pixels[i][1], scratch->samples + i * parts, parts);
-    figures->n_refined_pixels += n;
-}
-
-static void count_pixel(const struct frame *frame, int x, int y, struct tile_figures *figures)
-{
-    const float *shadow = gn_image_at(&frame->layers->shadow, x, y);
-    figures->n_virtual_pixels += gn_image_at(&frame->layers->virtual_rgba, x, y)[3] > 0;
-    figures->n_shadow_pixels += shadow[0] < 1 || shadow[1] < 1 || shadow[2] < 1;
-}
-
-static void render_edges(void *context, int item, int worker)
-{
-    const struct frame *frame = context;
-    struct scratch *scratch = &frame->scratches[worker];
-    struct tile_figures *figures = &frame->figures[item];
-    int parts = frame->rule.grid * frame->rule.grid;
-    int pixels[BATCH][2];
-    int edges[BATCH][2];
-    int n_edges = 0;
-    int n = list_pixels(frame, item, pixels);
-    for (int i = 0; i < n; i++) {
-        if (!gn_refine_is_needed(frame, pixels[i][0], pixels[i][1]))
-            continue;
-        memcpy(edges[n_edges++], pixels[i], sizeof(edges[0]));
-        if ((n_edges + 1) * parts > BATCH) {
-            refine_pixels(frame, scratch, edges, n_edges, figures);
-            n_edges = 0;
-        }
-    }
-    if (n_edges > 0)
-        refine_pixels(frame, scratch, edges, n_edges, figures);
-    for (int i = 0; i < n; i++)
-        count_pixel(frame, pixels[i][0], pixels[i][1], figures);
-}
-
 static void widen_box(struct box *box, float by)
 {
     for (int k = 0; k < 3; k++) {
@@ -454,54 +273,6 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     init_light(frame);
 }
 
-static void sum_figures(const struct frame *frame, struct tile_figures *sum)
-{
-    memset(sum, 0, sizeof(*sum));
-    for (int i = 0; i < frame->tiles_x * frame->tiles_y; i++) {
-        const struct tile_figures *f = &frame->figures[i];
-        sum->s_primary += f->s_primary;
-        sum->s_shade += f->s_shade;
-        sum->s_shadow += f->s_shadow;
-        sum->rays_primary += f->rays_primary;
-        sum->rays_mirror += f->rays_mirror;
-        sum->rays_shade += f->rays_shade;
-        sum->rays_shadow += f->rays_shadow;
-        sum->n_mirrors += f->n_mirrors;
-        sum->n_near += f->n_near;
-        sum->n_lit += f->n_lit;
-        sum->n_receivers += f->n_receivers;
-        sum->n_rays_real += f->n_rays_real;
-        sum->error_sum += f->error_sum;
-        sum->error_n += f->error_n;
-        sum->n_virtual_pixels += f->n_virtual_pixels;
-        sum->n_shadow_pixels += f->n_shadow_pixels;
-        sum->n_refined_pixels += f->n_refined_pixels;
-    }
-}
-
-static void fill_report(const struct frame *frame, int n_workers, struct gn_render_report *report)
-{
-    struct tile_figures sum;
-    sum_figures(frame, &sum);
-    gn_plan_finish(frame, &sum, report);
-    report->ms_primary = 1e3 * sum.s_primary / n_workers;
-    report->ms_shade = 1e3 * sum.s_shade / n_workers;
-    report->ms_shadow = 1e3 * sum.s_shadow / n_workers;
-    report->rays_primary = sum.rays_primary;
-    report->rays_mirror = sum.rays_mirror;
-    report->rays_shade = sum.rays_shade;
-    report->rays_shadow = sum.rays_shadow;
-    report->n_lights = frame->lights->n_lit + frame->places->n + frame->near.n;
-    report->n_virtual_pixels = sum.n_virtual_pixels;
-    report->n_shadow_pixels = sum.n_shadow_pixels;
-    report->n_refined_pixels = sum.n_refined_pixels;
-    // The reference's directions are cells of a map, not samples of it: halves say nothing.
-    bool is_known = frame->options.quality != GN_QUALITY_REFERENCE && frame->run_shadow;
-    report->estimated_error = !is_known         ? -1
-                              : sum.error_n > 0 ? sqrt(sum.error_sum / (double)sum.error_n)
-                                                : 0;
-}
-
 static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
                    const struct gn_blend *blend, enum gn_quality quality, struct gn_layers *layers,
                    struct gn_error *out_error)
@@ -557,10 +328,8 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
     gn_plan_make(&frame, renderer->slopes, &report);
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
 
-    int n_tiles = frame.tiles_x * frame.tiles_y;
-    gn_pool_run(renderer->pool, n_tiles, render_centres, &frame);
-    gn_pool_run(renderer->pool, n_tiles, render_edges, &frame);
-    fill_report(&frame, renderer->n_workers, &report);
+    gn_tiles_render(&frame, renderer->pool);
+    gn_report_fill(&frame, renderer->n_workers, &report);
     report.ms_total = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
     *out_report = report;
     return 0;
