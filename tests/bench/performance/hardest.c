@@ -1,0 +1,147 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * The hardest row of the paper's table: 640 x 480, 122 lights, with shadows. Whole frames, the
+ * renderer's and those of the naive loop in turn. The naive frame is the renderer's own without
+ * shadow, and then the loop.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "tests/bench/performance/naive.h"
+#include "tests/bench/performance/performance.h"
+#include "tests/bench/timing.h"
+
+#define WIDTH 640
+#define N_LIGHTS 122
+#define MAX_PEERS 4
+
+/** One way to do the frame, and the naive loops that do the same. */
+struct kind {
+    const char *name;
+    struct gn_render_options options;
+    int n_peers;
+    enum gn_naive_real peers[MAX_PEERS / GN_NAIVE_ORDERS]; // each in both orders
+    bool is_same;                                          // the same pixels: compared
+};
+
+static const struct kind kinds[] = {
+    {"paper", {.quality = GN_QUALITY_SEED}, 1, {GN_NAIVE_NO_REAL}, true},
+    {"one-ray",
+     {.quality = GN_QUALITY_INTERACTIVE, .single_ray = true},
+     2,
+     {GN_NAIVE_REAL_FIRST, GN_NAIVE_REAL_WHERE_CUT},
+     true},
+    // The loop has one ray for a pixel still, as no loop knows where more are needed.
+    {"interactive",
+     {.quality = GN_QUALITY_INTERACTIVE},
+     2,
+     {GN_NAIVE_REAL_FIRST, GN_NAIVE_REAL_WHERE_CUT},
+     false},
+};
+
+static const char *const order_names[] = {"pixels", "lights"};
+static const char *const real_names[] = {"none", "first", "where-cut"};
+
+struct gn_shadow_difference gn_performance_compare(const struct gn_image *a,
+                                                   const struct gn_image *b)
+{
+    static const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
+    const double limit = 1.0 / 255;
+    struct gn_shadow_difference d = {0};
+    for (size_t i = 0; i < (size_t)a->width * (size_t)a->height; i++) {
+        bool is_off = false;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++) {
+            double factor = fabs((double)a->data[k] - b->data[k]);
+            double code = fabs((double)gn_response_encode(&srgb, a->data[k]) -
+                               gn_response_encode(&srgb, b->data[k]));
+            d.largest = fmax(d.largest, factor);
+            d.largest_code = fmax(d.largest_code, code);
+            is_off |= !(factor <= limit) || !(code <= limit); // a NaN is off
+        }
+        d.n_off += is_off;
+    }
+    return d;
+}
+
+/** The naive loop of one kind's i-th peer. */
+static void choose_peer(const struct kind *kind, int i, struct gn_naive *naive)
+{
+    naive->order = (enum gn_naive_order)(i % GN_NAIVE_ORDERS);
+    naive->real = kind->peers[i / GN_NAIVE_ORDERS];
+    naive->is_unweighted = kind->options.quality == GN_QUALITY_SEED;
+}
+
+static void measure_kind(const struct gn_performance *run, struct gn_bench_rig *rig,
+                         const struct gn_lighting_state *light, struct gn_naive *naive,
+                         const struct kind *kind, FILE *file)
+{
+    struct gn_render_options without = kind->options;
+    without.no_shadow = true;
+    without.single_ray = true;
+    int n_peers = kind->n_peers * GN_NAIVE_ORDERS;
+    struct gn_bench_times times[1 + MAX_PEERS] = {{0}};
+    struct gn_shadow_difference differences[MAX_PEERS] = {{0}};
+    uint64_t rays[MAX_PEERS];
+    struct gn_image shadow;
+    gn_bench_check(gn_image_init(&shadow, rig->layers.width, rig->layers.height, 3), "a picture");
+    for (int round = 0; round < 1 + run->n_repeats; round++) { // the first warms up
+        gn_bench_start(&times[0]);
+        gn_bench_rig_render(rig, light, &kind->options);
+        gn_bench_stop(&times[0]);
+        if (round == 0)
+            memcpy(shadow.data, rig->layers.shadow.data,
+                   3 * sizeof(float) * (size_t)shadow.width * (size_t)shadow.height);
+        for (int i = 0; i < n_peers; i++) {
+            choose_peer(kind, i, naive);
+            gn_bench_start(&times[1 + i]);
+            gn_bench_rig_render(rig, light, &without);
+            gn_naive_run(naive, rig->layers.shadow.data);
+            gn_bench_stop(&times[1 + i]);
+            if (round == 0)
+                differences[i] = gn_performance_compare(&shadow, &rig->layers.shadow);
+            rays[i] = naive->n_rays;
+        }
+        for (int i = 0; round == 0 && i < 1 + n_peers; i++)
+            times[i].n = 0;
+    }
+    gn_bench_rig_render(rig, light, &kind->options);
+    struct gn_bench_timing t = gn_bench_sum_up(&times[0]);
+    fprintf(file, "%s,renderer,,%d,%.3f,%.3f,%llu,,,\n", kind->name, rig->report.n_lights, t.median,
+            t.iqr, (unsigned long long)rig->report.rays_shadow);
+    for (int i = 0; i < n_peers; i++) {
+        choose_peer(kind, i, naive);
+        t = gn_bench_sum_up(&times[1 + i]);
+        fprintf(file, "%s,%s,%s,%d,%.3f,%.3f,%llu,", kind->name, order_names[naive->order],
+                real_names[naive->real], naive->n_lights, t.median, t.iqr,
+                (unsigned long long)rays[i]);
+        if (kind->is_same)
+            fprintf(file, "%.3g,%.3g,%lld\n", differences[i].largest, differences[i].largest_code,
+                    (long long)differences[i].n_off);
+        else
+            fprintf(file, ",,\n");
+    }
+    gn_image_finish(&shadow);
+}
+
+void gn_performance_measure_hardest(const struct gn_performance *run)
+{
+    struct gn_bench_rig rig;
+    struct gn_naive naive;
+    FILE *file = gn_performance_open(run, "hardest",
+                                     "frame,loop,real,lights,ms,iqr,rays,largest,largest_code,off");
+    gn_bench_rig_init(&rig, run->n_threads);
+    gn_bench_rig_aim(&rig, WIDTH);
+    struct gn_lighting_state *light = gn_bench_rig_make_seed_light(&rig, N_LIGHTS);
+    gn_bench_rig_render(&rig, light, NULL); // gives the layers their size
+    gn_bench_check(gn_naive_init(&naive, rig.scene, rig.pool, &rig.camera, light),
+                   "the naive loop");
+    for (size_t i = 0; i < GN_ARRAY_LEN(kinds); i++)
+        measure_kind(run, &rig, light, &naive, &kinds[i], file);
+    gn_naive_finish(&naive);
+    gn_lighting_state_unref(&light);
+    gn_bench_rig_finish(&rig);
+    gn_performance_close(file);
+}
