@@ -7,19 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "common/pool.h"
 #include "server/light/luminance.h"
 #include "server/light/map_samples.h"
 #include "server/light/sh.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
+#include "tests/light_states.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -54,17 +47,6 @@ static double worst_balance; // of all states of a test
 static const char *get_name(int m)
 {
     return gn_light_method_get_name(methods[m].method);
-}
-
-static struct gn_lighting_state *make_state(const struct light_fixture *f,
-                                            const struct gn_light_options *options,
-                                            struct gn_pool *pool)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(&f->frame, NULL, options, pool, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
 }
 
 /* Not as the paper reads, nor where samples are weighted by their density: an estimate. */

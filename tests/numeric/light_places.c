@@ -8,18 +8,7 @@
 #include "proto/attr.h"
 #include "server/light/map_samples.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
-#include "tests/unit/cmocka_setup.h"
-
-static struct gn_lighting_state *make_state(const struct gn_environment_frame *frame,
-                                            const struct gn_light_options *options)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(frame, NULL, options, NULL, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
-}
+#include "tests/light_states.h"
 
 static const char *get_name(const struct gn_light_options *options)
 {
@@ -103,7 +92,7 @@ static void trap_5_a_lamp_at_a_pole_or_on_the_seam(void **unused)
         for (int i = 0; i < 2 * GN_LIGHT_METHOD_COUNT; i++) {
             struct gn_light_options options = {.method = (enum gn_light_method)(i / 2),
                                                .no_discs = i % 2};
-            struct gn_lighting_state *s = make_state(&f.frame, &options);
+            struct gn_lighting_state *s = make_state(&f, &options, NULL);
             check_sum(s, &options);
             double lamp = 0, toward[3] = {0}, truth = get_by_texels(s, dir);
             for (int l = 0; l < s->n_lights; l++) {
@@ -151,7 +140,7 @@ static void a_lamp_on_the_horizon(void **unused)
         struct gn_lighting_state *s;
         for (int m = 0; m < GN_LIGHT_METHOD_COUNT; m++) {
             const struct gn_light_options options = {.method = (enum gn_light_method)m};
-            s = make_state(&f.frame, &options);
+            s = make_state(&f, &options, NULL);
             check_sum(s, &options);
             if (s->n_lights == 0 && m != GN_LIGHT_PARTITION_SEED) // whose strict mean may say so
                 fail_msg("%s, %s: no lights", get_name(&options), gn_projection_get_name(types[t]));
@@ -189,7 +178,7 @@ static void two_identical_suns(void **unused)
         for (int i = 0; i < 2 * GN_LIGHT_METHOD_COUNT; i++) {
             struct gn_light_options options = {.method = (enum gn_light_method)(i / 2),
                                                .no_discs = i % 2};
-            struct gn_lighting_state *s = make_state(&f.frame, &options);
+            struct gn_lighting_state *s = make_state(&f, &options, NULL);
             check_sum(s, &options);
             double power[2] = {0}, middle[3];
             for (int c = 0; c < 3; c++)
@@ -202,10 +191,8 @@ static void two_identical_suns(void **unused)
             }
             double half = 0.5 * (power[0] + power[1]);
             options.previous = s;
-            struct gn_lighting_state *next = make_state(&f.frame, &options);
-            assert_int_equal(next->n_lights, s->n_lights);
-            for (int l = 0; l < s->n_lights; l++)
-                assert_true(light_fixture_is_same(&s->lights[l], &next->lights[l]));
+            struct gn_lighting_state *next = make_state(&f, &options, NULL);
+            assert_same_lights(next, s);
             worst = fmax(worst, fabs(power[0] - half) / half);
             n_discs += s->figures.n_discs;
             gn_lighting_state_unref(&next);

@@ -5,16 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "server/light/compact.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
+#include "tests/light_states.h"
 
 static const double degree = 3.14159265358979323846 / 180;
 
@@ -152,16 +145,6 @@ static void a_suns_glow_is_left(void **unused)
     light_fixture_finish(&f);
 }
 
-static struct gn_lighting_state *make_state(const struct light_fixture *f,
-                                            const struct gn_light_options *options)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(&f->frame, NULL, options, NULL, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
-}
-
 static void methods_keep_suns_whole(void **unused)
 {
     (void)unused;
@@ -170,7 +153,7 @@ static void methods_keep_suns_whole(void **unused)
     gn_radiance_map_unref(&map);
     for (int m = 0; m < GN_LIGHT_METHOD_COUNT; m++) {
         struct gn_light_options options = {.method = (enum gn_light_method)m, .no_sh = true};
-        struct gn_lighting_state *state = make_state(&f, &options);
+        struct gn_lighting_state *state = make_state(&f, &options, NULL);
         bool is_seed = m == GN_LIGHT_PARTITION_SEED;
         assert_int_equal(state->figures.n_discs, is_seed ? 0 : 2);
         double sum[3] = {0};
@@ -185,7 +168,7 @@ static void methods_keep_suns_whole(void **unused)
         options.previous = state;
         for (int i = 0; i < 1024 * 512 * 3; i++)
             f.image.data[i] *= f.image.data[i] > 1.5e5f ? 0.2f : 1;
-        struct gn_lighting_state *next = make_state(&f, &options);
+        struct gn_lighting_state *next = make_state(&f, &options, NULL);
         if (!is_seed) {
             assert_int_equal(next->figures.n_discs, 2);
             assert_true(next->lights[0].id == state->lights[1].id);
@@ -194,7 +177,7 @@ static void methods_keep_suns_whole(void **unused)
         light_fixture_fill(&f, paint_suns);
         options.previous = NULL;
         options.no_discs = true;
-        struct gn_lighting_state *without = make_state(&f, &options);
+        struct gn_lighting_state *without = make_state(&f, &options, NULL);
         assert_int_equal(without->figures.n_discs, 0);
         for (int i = 0; i < without->n_lights; i++)
             assert_false(without->lights[i].is_disc);

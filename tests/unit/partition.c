@@ -6,42 +6,19 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "server/light/luminance.h"
 #include "server/light/sh.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
+#include "tests/light_states.h"
 
 static const double pi = 3.14159265358979323846;
 
-static struct gn_lighting_state *make_state(const struct light_fixture *f,
-                                            const struct gn_light_options *options)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(&f->frame, NULL, options, NULL, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
-}
-
 static int count_lights(const struct light_fixture *f, const struct gn_light_options *options)
 {
-    struct gn_lighting_state *state = make_state(f, options);
+    struct gn_lighting_state *state = make_state(f, options, NULL);
     int n = state->n_lights;
     gn_lighting_state_unref(&state);
     return n;
-}
-
-static void make_room(struct light_fixture *f, enum gn_projection_type type, int width, int height)
-{
-    assert_int_equal(light_fixture_init(f, type, width, height), 0);
-    light_fixture_fill(f, light_fixture_room);
 }
 
 static void check_energy(const struct gn_lighting_state *state, double tolerance)
@@ -82,7 +59,7 @@ static void energy_is_kept_and_the_number_met(void **unused)
             struct gn_light_options options = {.n_lights = wanted[i % 6],
                                                .method = i < 6 ? GN_LIGHT_PARTITION_ENERGY
                                                                : GN_LIGHT_PENROSE};
-            struct gn_lighting_state *state = make_state(&f, &options);
+            struct gn_lighting_state *state = make_state(&f, &options, NULL);
             check_energy(state, 1e-5);
             assert_near(state->n_lights, wanted[i % 6], 3 + 0.15 * wanted[i % 6]);
             gn_lighting_state_unref(&state);
@@ -96,7 +73,7 @@ static void lights_and_harmonics_agree(void **unused)
     (void)unused;
     struct light_fixture f;
     make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300);
-    struct gn_lighting_state *state = make_state(&f, NULL);
+    struct gn_lighting_state *state = make_state(&f, NULL, NULL);
     const struct gn_radiance_map *map = state->map;
     static const double normals[6][3] = {{0, 0, 1},  {0, 0, -1},    {1, 0, 0},
                                          {0, -1, 0}, {0.6, 0, 0.8}, {0, 0.6, -0.8}};
@@ -131,7 +108,7 @@ static void the_papers_reading_is_literal(void **unused)
     struct light_fixture f;
     make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300);
     struct gn_light_options options = {.method = GN_LIGHT_PARTITION_SEED, .max_ls = 1};
-    struct gn_lighting_state *state = make_state(&f, &options);
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
     assert_int_equal(state->figures.rings, 8);
     assert_int_equal(state->figures.sectors, 24);
     assert_int_equal(state->n_lights, state->figures.n_bright); // maxLS 1: one light per region
@@ -174,9 +151,9 @@ static void each_reading_can_be_mended(void **unused)
         for (int i = 0; i < 2; i++) {
             unsigned base = i == 1 ? GN_READ_SAMPLE_MEAN : 0; // for ratios beyond max_ls
             options[i].mended = base;
-            struct gn_lighting_state *literal = make_state(&f, &options[i]);
+            struct gn_lighting_state *literal = make_state(&f, &options[i], NULL);
             options[i].mended = base | reading;
-            struct gn_lighting_state *mended = make_state(&f, &options[i]);
+            struct gn_lighting_state *mended = make_state(&f, &options[i], NULL);
             n_different += mended->n_lights != literal->n_lights;
             for (int k = 0; k < mended->n_lights && k < literal->n_lights; k++)
                 n_different += !light_fixture_is_same(&mended->lights[k], &literal->lights[k]);
@@ -189,7 +166,7 @@ static void each_reading_can_be_mended(void **unused)
     /* Every reading mended, with the logarithm: the energy partition in the seed's division. */
     struct gn_light_options all = {
         .method = GN_LIGHT_PARTITION_SEED, .mended = GN_READ_ALL, .metric = GN_METRIC_LOG2};
-    struct gn_lighting_state *state = make_state(&f, &all);
+    struct gn_lighting_state *state = make_state(&f, &all, NULL);
     check_energy(state, 1e-5);
     gn_lighting_state_unref(&state);
     light_fixture_finish(&f);
@@ -202,7 +179,7 @@ static void constant_light_has_a_light_per_region(void **unused)
     assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 100, 100), 0);
     light_fixture_fill(&f, light_fixture_constant);
     struct gn_light_options options = {.n_lights = GN_LIGHTS_NO_AIM};
-    struct gn_lighting_state *state = make_state(&f, &options);
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
     assert_int_equal(state->n_lights, 4 * 12 + 12); // and the fill
     assert_int_equal(state->figures.n_bright, 48);
     check_energy(state, 1e-5);
@@ -228,7 +205,7 @@ static void one_lamp_is_divided_and_the_rest_merged(void **unused)
     assert_int_equal(light_fixture_init(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 300, 300), 0);
     light_fixture_fill(&f, one_lamp);
     struct gn_light_options options = {.n_lights = GN_LIGHTS_NO_AIM};
-    struct gn_lighting_state *state = make_state(&f, &options);
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
     assert_true(state->figures.n_bright <= 4); // the regions the lamp touches
     assert_int_equal(state->figures.n_dark_lights, 12);
     int n_on_lamp = 0;
@@ -286,7 +263,7 @@ static void turning_by_a_dark_sector_turns_the_lights(void **unused)
     struct light_fixture f;
     make_room(&f, GN_PROJECTION_LATLONG, 240, 120);
     struct gn_light_options options = {.rings = 4, .sectors = 12};
-    struct gn_lighting_state *still = make_state(&f, &options);
+    struct gn_lighting_state *still = make_state(&f, &options, NULL);
     struct gn_image turned_image;
     assert_int_equal(gn_image_init(&turned_image, 240, 120, 3), 0);
     for (int y = 0; y < 120; y++)
@@ -294,7 +271,7 @@ static void turning_by_a_dark_sector_turns_the_lights(void **unused)
             memcpy(gn_image_at(&turned_image, (x + 40) % 240, y), gn_image_at(&f.image, x, y),
                    3 * sizeof(float));
     f.frame.codes = &turned_image;
-    struct gn_lighting_state *turned = make_state(&f, &options);
+    struct gn_lighting_state *turned = make_state(&f, &options, NULL);
     assert_int_equal(turned->n_lights, still->n_lights);
     double c = cos(-pi / 3), s = sin(-pi / 3); // to the right is towards falling phi
     for (int i = 0; i < still->n_lights; i++) {
@@ -321,16 +298,14 @@ static void a_stream_shares_its_plan(void **unused)
     make_room(&f, GN_PROJECTION_FISHEYE_EQUIDISTANT, 100, 100);
     f.frame.sequence = 7;
     f.frame.capture_time_ns = 123;
-    struct gn_lighting_state *first = make_state(&f, NULL);
+    struct gn_lighting_state *first = make_state(&f, NULL, NULL);
     struct gn_light_options options = {.previous = first};
-    struct gn_lighting_state *second = make_state(&f, &options);
+    struct gn_lighting_state *second = make_state(&f, &options, NULL);
     assert_ptr_equal(first->plan, second->plan);
     assert_ptr_equal(first->map->table, second->map->table);
-    assert_int_equal(first->n_lights, second->n_lights);
-    for (int i = 0; i < first->n_lights; i++)
-        assert_true(light_fixture_is_same(&first->lights[i], &second->lights[i]));
+    assert_same_lights(first, second);
     options.rings = 3;
-    struct gn_lighting_state *other = make_state(&f, &options);
+    struct gn_lighting_state *other = make_state(&f, &options, NULL);
     assert_ptr_not_equal(first->plan, other->plan);
     assert_true(first->sequence == 7 && first->capture_time_ns == 123 && first->has_sh);
     assert_true(first->published_time_ns > 0 && first->ms_map > 0 && first->ms_lights > 0);

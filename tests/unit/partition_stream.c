@@ -6,81 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "common/clock.h"
 #include "server/light/partition_plan.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
-
-static struct gn_lighting_state *make_state(const struct light_fixture *f,
-                                            const struct gn_light_options *options,
-                                            struct gn_pool *pool)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(&f->frame, NULL, options, pool, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
-}
-
-/* One more frame of the stream, a thirtieth of a second later. */
-static void advance(struct light_fixture *f, struct gn_light_options *options,
-                    struct gn_lighting_state **state)
-{
-    f->frame.capture_time_ns += GN_NS_PER_S / 30;
-    options->previous = *state;
-    struct gn_lighting_state *next = make_state(f, options, NULL);
-    gn_lighting_state_unref(state);
-    *state = next;
-}
-
-static const struct gn_light *find(const struct gn_lighting_state *state, uint64_t id)
-{
-    for (int i = 0; i < state->n_lights; i++)
-        if (state->lights[i].id == id)
-            return &state->lights[i];
-    return NULL;
-}
-
-static int count_new(const struct gn_lighting_state *before, const struct gn_lighting_state *after)
-{
-    int n = 0;
-    for (int i = 0; i < after->n_lights; i++)
-        n += find(before, after->lights[i].id) == NULL;
-    return n;
-}
-
-static void make_room(struct light_fixture *f, enum gn_projection_type type, int width, int height)
-{
-    assert_int_equal(light_fixture_init(f, type, width, height), 0);
-    light_fixture_fill(f, light_fixture_room);
-}
+#include "tests/light_states.h"
 
 /* In the middle of a region of 4 x 12: theta 52 degrees is the second ring of equal height. */
 static const double lamp_dir[3] = {0.7612, 0.2040, 0.6157};
-
-static bool is_on_lamp(const double dir[static 3])
-{
-    return dir[0] * lamp_dir[0] + dir[1] * lamp_dir[1] + dir[2] * lamp_dir[2] > 0.9962;
-}
-
-static void set_lamp(struct light_fixture *f, float radiance)
-{
-    for (int y = 0; y < f->image.height; y++)
-        for (int x = 0; x < f->image.width; x++) {
-            double d[3];
-            if (gn_projection_get_direction(&f->frame.projection, x + 0.5, y + 0.5, d) &&
-                is_on_lamp(d))
-                for (int c = 0; c < 3; c++)
-                    gn_image_at(&f->image, x, y)[c] = radiance;
-        }
-}
 
 static int find_region(const struct gn_partition_plan *plan, const float dir[static 3])
 {
@@ -101,7 +33,7 @@ static void a_blinking_lamp_stays_in_its_region(void **unused)
         struct light_fixture f;
         struct gn_light_options options = {.rings = 4, .sectors = 12};
         make_room(&f, types[t], 192, t ? 96 : 192);
-        set_lamp(&f, 0.2f);
+        set_lamp(&f, lamp_dir, 0.2f);
         struct gn_lighting_state *state = make_state(&f, &options, NULL);
         struct gn_lighting_state *first = gn_lighting_state_ref(state);
         const float lamp[3] = {(float)lamp_dir[0], (float)lamp_dir[1], (float)lamp_dir[2]};
@@ -110,13 +42,13 @@ static void a_blinking_lamp_stays_in_its_region(void **unused)
         int n_on = 0, n_off = 0;
         for (int i = 1; i < 100; i++) {
             bool is_on = i < 10 ? i % 2 == 1 : i < 50;
-            set_lamp(&f, is_on ? 30 : 0.2f);
-            advance(&f, &options, &state);
+            set_lamp(&f, lamp_dir, is_on ? 30 : 0.2f);
+            advance(&f, GN_NS_PER_S / 30, &options, &state);
             const struct gn_lighting_state *pair[2] = {first, state};
             for (int k = 0; k < 2; k++) { // those that were, and those that are
                 for (int j = 0; j < pair[k]->n_lights; j++) {
                     const struct gn_light *light = &pair[k]->lights[j];
-                    const struct gn_light *other = find(pair[1 - k], light->id);
+                    const struct gn_light *other = find_light(pair[1 - k], light->id);
                     int region = find_region(state->plan, light->dir_world);
                     bool is_near = region >= 0 && gn_partition_plan_get_dark_cell(
                                                       state->plan, region) == lamp_cell;
@@ -134,19 +66,6 @@ static void a_blinking_lamp_stays_in_its_region(void **unused)
         gn_lighting_state_unref(&first);
         gn_lighting_state_unref(&state);
         light_fixture_finish(&f);
-    }
-}
-
-/* Noise of 1 % of each channel. */
-static void add_noise(const struct light_fixture *clean, struct light_fixture *f, uint32_t *random)
-{
-    for (int i = 0; i < 3 * f->image.width * f->image.height; i++) {
-        float sum = 0; // of twelve even ones: a standard deviation of 1
-        for (int k = 0; k < 12; k++) {
-            *random = *random * 1664525 + 1013904223;
-            sum += (float)(*random >> 8) / (float)(1 << 24) - 0.5f;
-        }
-        f->image.data[i] = clean->image.data[i] * (1 + 0.01f * sum);
     }
 }
 
@@ -174,7 +93,7 @@ static void noise_turns_no_region(void **unused)
         for (int i = 0; i < 30; i++) {
             add_noise(&clean, &f, &random);
             struct gn_lighting_state *before = gn_lighting_state_ref(state);
-            advance(&f, &options, &state);
+            advance(&f, GN_NS_PER_S / 30, &options, &state);
             n_changes += count_new(before, state) + count_new(state, before);
             gn_lighting_state_unref(&before);
         }
@@ -190,7 +109,7 @@ static float lamp_radiance;
 
 static void even_with_lamp(const double dir[static 3], float out[static 3])
 {
-    out[0] = out[1] = out[2] = is_on_lamp(dir) ? lamp_radiance : 1;
+    out[0] = out[1] = out[2] = is_on_lamp(lamp_dir, dir) ? lamp_radiance : 1;
 }
 
 static int count_in_lamps_region(const struct gn_lighting_state *state)
@@ -219,7 +138,7 @@ static void a_region_is_cut_with_hysteresis(void **unused)
         double mean = 1.9 + 0.3 * (i < 200 ? i : 400 - i) / 200; // of the region
         lamp_radiance = (float)(1 + (mean - 1) / share);
         light_fixture_fill(&f, even_with_lamp);
-        advance(&f, &options, &state);
+        advance(&f, GN_NS_PER_S / 30, &options, &state);
         if (cut_at == 0 && count_in_lamps_region(state) == 2)
             cut_at = mean;
         if (i > 200 && whole_at == 0 && count_in_lamps_region(state) == 1)
@@ -244,7 +163,7 @@ static void the_number_follows_in_time(void **unused)
     for (int i = 0; i < 3 * 150 * 150; i++)
         f.image.data[i] *= f.image.data[i] < 3 ? 1 : 0.3f;
     for (int i = 0; i < 90; i++) {
-        advance(&f, &options, &state);
+        advance(&f, GN_NS_PER_S / 30, &options, &state);
         if (i == 0) {
             n_before = state->n_lights;
             assert_true(n_before < 0.7 * n);
@@ -256,12 +175,10 @@ static void the_number_follows_in_time(void **unused)
     assert_true(n_before >= 0.75 * 400 && n_before < 0.85 * 400);
     for (int i = 0; i < 3 * 150 * 150; i++)
         f.image.data[i] *= 0.01f;
-    advance(&f, &options, &state);
+    advance(&f, GN_NS_PER_S / 30, &options, &state);
     options.previous = NULL;
     struct gn_lighting_state *fresh = make_state(&f, &options, NULL);
-    assert_int_equal(state->n_lights, fresh->n_lights);
-    for (int i = 0; i < fresh->n_lights; i++)
-        assert_true(light_fixture_is_same(&state->lights[i], &fresh->lights[i]));
+    assert_same_lights(state, fresh);
     gn_lighting_state_unref(&fresh);
     gn_lighting_state_unref(&state);
     light_fixture_finish(&f);
@@ -276,18 +193,16 @@ static void another_stream_is_forgotten(void **unused)
     for (int method = 0; method < GN_LIGHT_METHOD_COUNT; method++) {
         struct gn_light_options options = {.method = (enum gn_light_method)method, .stream = 1};
         struct gn_lighting_state *other = make_state(&f, &options, NULL);
-        set_lamp(&f, 0.7f);
+        set_lamp(&f, lamp_dir, 0.7f);
         options.stream = 2;
         struct gn_lighting_state *fresh = make_state(&f, &options, NULL);
         options.previous = other;
         struct gn_lighting_state *second = make_state(&f, &options, NULL);
-        assert_int_equal(second->n_lights, fresh->n_lights);
-        for (int i = 0; i < fresh->n_lights; i++)
-            assert_true(light_fixture_is_same(&second->lights[i], &fresh->lights[i]));
+        assert_same_lights(second, fresh);
         gn_lighting_state_unref(&other);
         gn_lighting_state_unref(&fresh);
         gn_lighting_state_unref(&second);
-        set_lamp(&f, 20);
+        set_lamp(&f, lamp_dir, 20);
     }
     light_fixture_finish(&f);
 }
@@ -310,7 +225,7 @@ static void names_are_unique(void **unused)
         assert_true(state->n_lights > 20);
         for (int i = 0; i < state->n_lights; i++) {
             assert_true(state->lights[i].id != 0);
-            assert_ptr_equal(find(state, state->lights[i].id), &state->lights[i]);
+            assert_ptr_equal(find_light(state, state->lights[i].id), &state->lights[i]);
         }
         gn_lighting_state_unref(&state);
     }
@@ -327,13 +242,11 @@ static void threads_do_not_matter(void **unused)
     assert_int_equal(gn_pool_create(3, &pool), 0);
     struct gn_light_options options = {.n_lights = 200};
     struct gn_lighting_state *first = make_state(&f, &options, NULL);
-    set_lamp(&f, 50);
+    set_lamp(&f, lamp_dir, 50);
     options.previous = first;
     struct gn_lighting_state *one = make_state(&f, &options, NULL);
     struct gn_lighting_state *many = make_state(&f, &options, pool);
-    assert_int_equal(one->n_lights, many->n_lights);
-    for (int i = 0; i < one->n_lights; i++)
-        assert_true(light_fixture_is_same(&one->lights[i], &many->lights[i]));
+    assert_same_lights(one, many);
     gn_lighting_state_unref(&first);
     gn_lighting_state_unref(&one);
     gn_lighting_state_unref(&many);

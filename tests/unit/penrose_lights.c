@@ -6,28 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "common/clock.h"
 #include "server/light/luminance.h"
 #include "server/light/state.h"
-#include "tests/light_fixture.h"
-
-static struct gn_lighting_state *make_state(const struct light_fixture *f,
-                                            const struct gn_light_options *options,
-                                            struct gn_pool *pool)
-{
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error = {0};
-    if (gn_lighting_state_create(&f->frame, NULL, options, pool, &state, &error) < 0)
-        fail_msg("%s", error.text);
-    return state;
-}
+#include "tests/light_states.h"
 
 static double get_sum(const struct gn_lighting_state *state, int channel)
 {
@@ -35,12 +17,6 @@ static double get_sum(const struct gn_lighting_state *state, int channel)
     for (int i = 0; i < state->n_lights; i++)
         sum += (double)state->lights[i].irradiance[channel];
     return sum;
-}
-
-static void make_room(struct light_fixture *f, enum gn_projection_type type, int width, int height)
-{
-    assert_int_equal(light_fixture_init(f, type, width, height), 0);
-    light_fixture_fill(f, light_fixture_room);
 }
 
 static void weights_add_up_to_the_map(void **unused)
@@ -151,54 +127,14 @@ static void threads_do_not_matter(void **unused)
         .method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_PARTITION, .n_lights = 200};
     struct gn_lighting_state *one = make_state(&f, &options, NULL);
     struct gn_lighting_state *many = make_state(&f, &options, pool);
-    assert_int_equal(one->n_lights, many->n_lights);
-    for (int i = 0; i < one->n_lights; i++)
-        assert_true(light_fixture_is_same(&one->lights[i], &many->lights[i]));
+    assert_same_lights(one, many);
     gn_lighting_state_unref(&one);
     gn_lighting_state_unref(&many);
     gn_pool_destroy(&pool);
     light_fixture_finish(&f);
 }
 
-/* The light of that id, or NULL. */
-static const struct gn_light *find(const struct gn_lighting_state *state, uint64_t id)
-{
-    for (int i = 0; i < state->n_lights; i++)
-        if (state->lights[i].id == id)
-            return &state->lights[i];
-    return NULL;
-}
-
-static int count_new(const struct gn_lighting_state *before, const struct gn_lighting_state *after)
-{
-    int n = 0;
-    for (int i = 0; i < after->n_lights; i++)
-        n += find(before, after->lights[i].id) == NULL;
-    return n;
-}
-
-/* One more frame of the stream. */
-static void advance(const struct light_fixture *f, struct gn_light_options *options,
-                    struct gn_lighting_state **state)
-{
-    options->previous = *state;
-    struct gn_lighting_state *next = make_state(f, options, NULL);
-    gn_lighting_state_unref(state);
-    *state = next;
-}
-
-/* A lamp at +x, seen by the texels within 5 degrees. */
-static void set_lamp(struct light_fixture *f, float radiance)
-{
-    for (int y = 0; y < f->image.height; y++)
-        for (int x = 0; x < f->image.width; x++) {
-            double d[3];
-            if (gn_projection_get_direction(&f->frame.projection, x + 0.5, y + 0.5, d) &&
-                d[0] > 0.9962)
-                for (int c = 0; c < 3; c++)
-                    gn_image_at(&f->image, x, y)[c] = radiance;
-        }
-}
+static const double lamp_dir[3] = {1, 0, 0};
 
 static void a_blinking_lamp_moves_no_other_sample(void **unused)
 {
@@ -206,22 +142,21 @@ static void a_blinking_lamp_moves_no_other_sample(void **unused)
     struct light_fixture f;
     struct gn_light_options options = {.method = GN_LIGHT_PENROSE, .weights = GN_WEIGHTS_EQUAL};
     make_room(&f, GN_PROJECTION_LATLONG, 128, 64);
-    set_lamp(&f, 0.2f);
+    set_lamp(&f, lamp_dir, 0.2f);
     struct gn_lighting_state *state = make_state(&f, &options, NULL);
     struct gn_lighting_state *first = gn_lighting_state_ref(state);
     for (int i = 1; i < 90; i++) {
         bool is_on = i / 30 % 2 == 0;
-        f.frame.capture_time_ns += GN_NS_PER_S / 30;
-        set_lamp(&f, is_on ? 40 : 0.2f);
-        advance(&f, &options, &state);
+        set_lamp(&f, lamp_dir, is_on ? 40 : 0.2f);
+        advance(&f, GN_NS_PER_S / 30, &options, &state);
         int n_on_lamp = 0, n_lost = 0;
         for (int k = 0; k < first->n_lights; k++)
             n_lost += first->lights[k].dir_world[0] <= 0.9962f &&
-                      find(state, first->lights[k].id) == NULL;
+                      find_light(state, first->lights[k].id) == NULL;
         assert_int_equal(n_lost, 0);
         for (int k = 0; k < state->n_lights; k++) {
             const struct gn_light *light = &state->lights[k];
-            const struct gn_light *before = find(first, light->id);
+            const struct gn_light *before = find_light(first, light->id);
             if (light->dir_world[0] > 0.9962f) {
                 n_on_lamp++;
                 continue;
@@ -236,19 +171,6 @@ static void a_blinking_lamp_moves_no_other_sample(void **unused)
     light_fixture_finish(&f);
 }
 
-/* Noise of 1 % of each channel. */
-static void add_noise(const struct light_fixture *clean, struct light_fixture *f, uint32_t *random)
-{
-    for (int i = 0; i < 3 * f->image.width * f->image.height; i++) {
-        float sum = 0; // of twelve even ones: a standard deviation of 1
-        for (int k = 0; k < 12; k++) {
-            *random = *random * 1664525 + 1013904223;
-            sum += (float)(*random >> 8) / (float)(1 << 24) - 0.5f;
-        }
-        f->image.data[i] = clean->image.data[i] * (1 + 0.01f * sum);
-    }
-}
-
 static void noise_bears_no_samples(void **unused)
 {
     (void)unused;
@@ -260,10 +182,9 @@ static void noise_bears_no_samples(void **unused)
     struct gn_lighting_state *state = make_state(&f, &options, NULL);
     int n_changes = 0;
     for (int i = 0; i < 40; i++) {
-        f.frame.capture_time_ns += GN_NS_PER_S / 30;
         add_noise(&clean, &f, &random);
         struct gn_lighting_state *before = gn_lighting_state_ref(state);
-        advance(&f, &options, &state);
+        advance(&f, GN_NS_PER_S / 30, &options, &state);
         n_changes += count_new(before, state) + count_new(state, before);
         gn_lighting_state_unref(&before);
     }
@@ -287,8 +208,7 @@ static void the_number_comes_back_in_time(void **unused)
         for (int i = 0; i < 3 * 128 * 64; i++)
             f.image.data[i] *= 2;
         for (int i = 0; i < rate / 2; i++) {
-            f.frame.capture_time_ns += GN_NS_PER_S / rate;
-            advance(&f, &options, &state);
+            advance(&f, GN_NS_PER_S / rate, &options, &state);
             if (i == 0)
                 assert_true(state->n_lights > 1.7 * n);
         }
@@ -296,7 +216,7 @@ static void the_number_comes_back_in_time(void **unused)
         assert_near(state->n_lights, expected, 0.05 * expected);
         for (int i = 0; i < 3 * 128 * 64; i++)
             f.image.data[i] *= 1000; // at once
-        advance(&f, &options, &state);
+        advance(&f, 0, &options, &state);
         assert_near(state->n_lights, n, 0.1 * n);
         gn_lighting_state_unref(&state);
         light_fixture_finish(&f);
