@@ -150,9 +150,26 @@ static int keep_sample(void *context, const struct gn_penrose_sample *sample)
     return 0;
 }
 
+int gn_penrose_relax_sample(double even_importance, struct gn_penrose_sample **out_samples,
+                            int *out_n)
+{
+    struct even even = {.importance = even_importance};
+    const struct gn_penrose_importance importance = {
+        .size = 1, .context = &even, .get_at = get_even, .get_max = get_even_max};
+    int rc = gn_penrose_sample_domain(&importance, keep_sample, &even);
+    if (rc < 0) {
+        free(even.samples);
+        return rc;
+    }
+    *out_samples = even.samples;
+    *out_n = even.n;
+    return 0;
+}
+
 /* Working memory of one phase, [n] each. */
 struct work {
-    struct even even;
+    int n;
+    struct gn_penrose_sample *samples;
     struct bins bins;
     double (*points)[2], (*centroid)[2];
     long *n_places;
@@ -162,16 +179,15 @@ struct work {
  * centroid, in the frame of the tile. */
 static int relax_once(struct work *work, float row[static GN_PENROSE_INDICES][2])
 {
-    const struct even *even = &work->even;
     int count[GN_PENROSE_INDICES] = {0};
     double step[GN_PENROSE_INDICES][2] = {{0}}, place[2], squared;
-    for (int i = 0; i < even->n; i++)
-        gn_penrose_get_corrected(&even->samples[i], (const float(*)[2])row, work->points[i]);
-    int rc = init_bins(&work->bins, (const double(*)[2])work->points, even->n);
+    for (int i = 0; i < work->n; i++)
+        gn_penrose_get_corrected(&work->samples[i], (const float(*)[2])row, work->points[i]);
+    int rc = init_bins(&work->bins, (const double(*)[2])work->points, work->n);
     if (rc < 0)
         return rc;
-    memset(work->centroid, 0, (size_t)even->n * sizeof(*work->centroid));
-    memset(work->n_places, 0, (size_t)even->n * sizeof(*work->n_places));
+    memset(work->centroid, 0, (size_t)work->n * sizeof(*work->centroid));
+    memset(work->n_places, 0, (size_t)work->n * sizeof(*work->n_places));
     for (int i = 0; i < SIDE * SIDE; i++) {
         get_place(i % SIDE, i / SIDE, place);
         int p = find_nearest(&work->bins, (const double(*)[2])work->points, place, &squared);
@@ -180,8 +196,8 @@ static int relax_once(struct work *work, float row[static GN_PENROSE_INDICES][2]
         work->n_places[p]++;
     }
     free(work->bins.point);
-    for (int i = 0; i < even->n; i++) {
-        const struct gn_penrose_sample *s = &even->samples[i];
+    for (int i = 0; i < work->n; i++) {
+        const struct gn_penrose_sample *s = &work->samples[i];
         if (!is_inner(work->points[i]) || work->n_places[i] == 0)
             continue;
         double angle = s->tile.direction * acos(-1) / 10, c = cos(angle), d = sin(angle);
@@ -201,23 +217,22 @@ static int relax_once(struct work *work, float row[static GN_PENROSE_INDICES][2]
 
 int gn_penrose_relax_phase(int phase, int n_iterations, float out_row[static GN_PENROSE_INDICES][2])
 {
-    struct work work = {.even = {.importance = gn_penrose_relax_get_importance(phase, LEVEL)}};
+    struct work work = {0};
     float row[GN_PENROSE_INDICES][2] = {{0}};
-    const struct gn_penrose_importance importance = {
-        .size = 1, .context = &work.even, .get_at = get_even, .get_max = get_even_max};
-    int rc = gn_penrose_sample_domain(&importance, keep_sample, &work.even);
-    size_t n = (size_t)work.even.n + 1;
+    int rc = gn_penrose_relax_sample(gn_penrose_relax_get_importance(phase, LEVEL), &work.samples,
+                                     &work.n);
+    size_t n = (size_t)work.n + 1;
     work.points = malloc(n * sizeof(*work.points));
     work.centroid = malloc(n * sizeof(*work.centroid));
     work.n_places = malloc(n * sizeof(*work.n_places));
-    if (!work.points || !work.centroid || !work.n_places)
+    if (rc == 0 && (!work.points || !work.centroid || !work.n_places))
         rc = -ENOMEM;
     for (int i = 0; rc == 0 && i < n_iterations; i++)
         rc = relax_once(&work, row);
     free(work.n_places);
     free(work.centroid);
     free(work.points);
-    free(work.even.samples);
+    free(work.samples);
     if (rc == 0)
         memcpy(out_row, row, sizeof(row));
     return rc;

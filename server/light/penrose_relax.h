@@ -20,6 +20,13 @@
 double gn_penrose_relax_get_importance(int phase, int level);
 
 /**
+ * The samples of an even importance on the unit square, uncorrected. Returns 0, *out_samples to be
+ * freed by the caller, or -ENOMEM. Thread-safety: safe.
+ */
+GN_MUST_USE int gn_penrose_relax_sample(double importance, struct gn_penrose_sample **out_samples,
+                                        int *out_n);
+
+/**
  * One phase's row of the table, relaxed n_iterations times. Deterministic. Returns 0 or -ENOMEM.
  * Thread-safety: safe.
  */

@@ -19,47 +19,19 @@
 
 enum { N_MAX = 16384 };
 
-/* Samples of an even importance on the unit square. */
-struct even {
-    double importance;
-    int n;
-    struct gn_penrose_sample samples[N_MAX];
-};
-
-static struct even even;
+/* Of an even importance on the unit square. */
+static struct gn_penrose_sample *samples;
+static int n_samples;
 static double points[N_MAX][2];
-
-static double get_even(void *context, double x, double y)
-{
-    (void)x;
-    (void)y;
-    return ((const struct even *)context)->importance;
-}
-
-static double get_even_max(void *context, const double low[static 2], const double high[static 2])
-{
-    (void)low;
-    (void)high;
-    return ((const struct even *)context)->importance;
-}
-
-static int keep(void *context, const struct gn_penrose_sample *sample)
-{
-    struct even *e = context;
-    assert_true(e->n < N_MAX);
-    e->samples[e->n++] = *sample;
-    return 0;
-}
 
 static void sample_phase(int phase, int level)
 {
-    even.importance = gn_penrose_relax_get_importance(phase, level);
-    even.n = 0;
-    assert_int_equal(gn_penrose_get_phase(even.importance), phase);
-    assert_int_equal(gn_penrose_get_level(even.importance), level);
-    const struct gn_penrose_importance importance = {
-        .size = 1, .context = &even, .get_at = get_even, .get_max = get_even_max};
-    assert_int_equal(gn_penrose_sample_domain(&importance, keep, &even), 0);
+    double importance = gn_penrose_relax_get_importance(phase, level);
+    assert_int_equal(gn_penrose_get_phase(importance), phase);
+    assert_int_equal(gn_penrose_get_level(importance), level);
+    free(samples);
+    assert_int_equal(gn_penrose_relax_sample(importance, &samples, &n_samples), 0);
+    assert_true(n_samples < N_MAX);
 }
 
 /* Places the samples by the row (NULL: where their tiles are), looked up n_deeper levels too deep;
@@ -68,8 +40,8 @@ static double measure(const float (*row)[2], int n_deeper)
 {
     int n_inner = 0;
     double moment = 0;
-    for (int i = 0; i < even.n; i++) {
-        struct gn_penrose_sample sample = even.samples[i];
+    for (int i = 0; i < n_samples; i++) {
+        struct gn_penrose_sample sample = samples[i];
         for (int d = 0; d < n_deeper; d++) {
             struct gn_penrose_tile child[4];
             gn_penrose_split(&sample.tile, child);
@@ -82,7 +54,8 @@ static double measure(const float (*row)[2], int n_deeper)
         n_inner += fabs(points[i][0] - 0.5) < 0.4 && fabs(points[i][1] - 0.5) < 0.4;
     }
     assert_int_equal(
-        gn_penrose_relax_measure((const double(*)[2])points, even.n, n_inner / 0.64, &moment), 0);
+        gn_penrose_relax_measure((const double(*)[2])points, n_samples, n_inner / 0.64, &moment),
+        0);
     return moment;
 }
 
@@ -114,8 +87,8 @@ static void a_phase_has_the_indices_below_its_threshold(void **unused)
         bool is_seen[GN_PENROSE_INDICES] = {false};
         int n_seen = 0;
         sample_phase(phase, 12);
-        for (int i = 0; i < even.n; i++)
-            is_seen[gn_penrose_get_structure(&even.samples[i].tile)] = true;
+        for (int i = 0; i < n_samples; i++)
+            is_seen[gn_penrose_get_structure(&samples[i].tile)] = true;
         for (int k = 0; k < GN_PENROSE_INDICES; k++) {
             const float *v = gn_penrose_table[phase][k];
             assert_true(is_seen[k] || (v[0] == 0 && v[1] == 0));
@@ -155,7 +128,7 @@ static double get_power(double from, double to)
             double f = hypot(u, v), re = 0, im = 0, weight = 0;
             if (f < from || f >= to)
                 continue;
-            for (int i = 0; i < even.n; i++) { // a window with soft sides
+            for (int i = 0; i < n_samples; i++) { // a window with soft sides
                 double w = sin(acos(-1) * points[i][0]) * sin(acos(-1) * points[i][1]);
                 double angle = 2 * acos(-1) * (u * points[i][0] + v * points[i][1]);
                 re += w * cos(angle);
@@ -174,11 +147,18 @@ static void low_frequencies_are_missing(void **unused)
     (void)unused;
     sample_phase(10, 9);
     measure(gn_penrose_table[10], 0);
-    double mean = sqrt(even.n); // frequency of a square lattice of the density
+    double mean = sqrt(n_samples); // frequency of a square lattice of the density
     double low = get_power(3, 0.7 * mean), peak = get_power(0.9 * mean, 1.2 * mean);
     print_message("# power below 0.7 of the mean frequency %.3f, about it %.3f\n", low, peak);
     assert_true(low < 0.1);
     assert_true(peak > 1);
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    free(samples);
+    return 0;
 }
 
 int main(void)
@@ -189,5 +169,5 @@ int main(void)
         cmocka_unit_test(the_table_is_what_its_maker_makes),
         cmocka_unit_test(low_frequencies_are_missing),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, tear_down);
 }
