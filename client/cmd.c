@@ -3,16 +3,12 @@
 #include "client/cmd.h"
 
 #include <errno.h>
-#include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "common/clock.h"
-
-/** Lateness that a replay catches up. */
-#define MAX_LATE_NS (2 * GN_NS_PER_S)
 
 int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
                 struct gn_options **out_options)
@@ -112,42 +108,6 @@ int gn_cmd_take_event(const struct gn_client_event *event, struct gn_error *out_
     return 0;
 }
 
-int gn_cmd_keep_clock(struct gn_client *client, int64_t *measured_ns, struct gn_error *out_error)
-{
-    int64_t now_ns = gn_clock_get_monotonic_ns();
-    if (now_ns - *measured_ns < 60 * GN_NS_PER_S)
-        return 0;
-    *measured_ns = now_ns;
-    int err = gn_client_sync_clock(client, 4, 5000);
-    // A server too busy to answer now leaves us with the clock we have.
-    return err && err != -ETIMEDOUT ? gn_cmd_set_fault(client, err, out_error) : 0;
-}
-
-int gn_cmd_serve_until(struct gn_client *client, int64_t *clock_ns, int64_t due_ns,
-                       struct gn_error *out_error)
-{
-    for (;;) {
-        if (gn_cmd_is_interrupted())
-            return -EINTR;
-        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
-        struct gn_client_event event;
-        int got = gn_client_poll(client, timeout_ms, &event);
-        int err = got < 0   ? gn_cmd_set_fault(client, got, out_error)
-                  : got > 0 ? gn_cmd_take_event(&event, out_error)
-                            : gn_cmd_keep_clock(client, clock_ns, out_error);
-        if (err || (got == 0 && timeout_ms == 0))
-            return err;
-    }
-}
-
-int gn_cmd_get_timeout_ms(int64_t due_ns)
-{
-    int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();
-    if (left_ns <= 0)
-        return 0;
-    return left_ns > 200 * GN_NS_PER_MS ? 200 : (int)(left_ns / GN_NS_PER_MS) + 1;
-}
-
 void gn_cmd_make_response(const struct gn_response *response, struct gn_msg_response *out)
 {
     static const enum gn_msg_response_type types[GN_RESPONSE_COUNT] = {
@@ -170,52 +130,6 @@ void gn_cmd_make_transform(const struct gn_pose *pose, struct gn_msg_transform *
     memset(out, 0, sizeof(*out));
     memcpy(out->orientation, pose->rotation, sizeof(pose->rotation));
     memcpy(out->position_m, pose->translation, sizeof(pose->translation));
-}
-
-void gn_cmd_pace_init(struct gn_cmd_pace *pace, const struct gn_program *program,
-                      const struct gn_options *options, double default_rate_hz)
-{
-    *pace = (struct gn_cmd_pace){.command = program->name};
-    pace->has_start = gn_options_is_set(options, NULL, NULL, "start-at");
-    if (pace->has_start) {
-        double start_s = gn_options_get_double(options, NULL, NULL, "start-at");
-        pace->start_ns =
-            gn_clock_get_monotonic_ns() + (int64_t)(start_s * 1e9) - gn_clock_get_realtime_ns();
-    }
-    pace->rate_hz = gn_options_is_set(options, NULL, NULL, "rate")
-                        ? gn_options_get_double(options, NULL, NULL, "rate")
-                        : default_rate_hz;
-    pace->is_looped = gn_options_get_bool(options, NULL, NULL, "loop");
-    pace->n_wanted = gn_options_get_int(options, NULL, NULL, "count");
-}
-
-int64_t gn_cmd_pace_get_due_ns(struct gn_cmd_pace *pace, long index, double time_s)
-{
-    double since_start_s = pace->rate_hz > 0 ? (double)index / pace->rate_hz : time_s;
-    int64_t since_start_ns = (int64_t)llround(since_start_s * 1e9);
-    int64_t now_ns = gn_clock_get_monotonic_ns();
-    if (!pace->has_start) {
-        pace->has_start = true;
-        pace->start_ns = now_ns - since_start_ns;
-    }
-    int64_t late_ns = now_ns - (pace->start_ns + since_start_ns);
-    if (late_ns > (index == 0 ? 0 : MAX_LATE_NS)) {
-        if (index == 0)
-            fprintf(stderr, "%s: the time to start was %.1f s ago; starting now\n", pace->command,
-                    (double)late_ns * 1e-9);
-        pace->start_ns += late_ns;
-        pace->shifted_ns += late_ns;
-    } else if (index == 0 && late_ns < -GN_NS_PER_S) {
-        printf("starting in %.1f s\n", (double)-late_ns * 1e-9);
-        fflush(stdout);
-    }
-    return pace->start_ns + since_start_ns;
-}
-
-void gn_cmd_pace_print(const struct gn_cmd_pace *pace)
-{
-    if (pace->shifted_ns > 0)
-        printf(", %.1f s behind schedule", (double)pace->shifted_ns * 1e-9);
 }
 
 static atomic_bool is_interrupted; // atomic: set by the signal handler (lock-free), read anywhere

@@ -8,19 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/capture/file.h"
-#include "client/capture/sequence.h"
-#include "client/cmd.h"
 #include "client/capture/halves.h"
-#include "common/clock.h"
+#include "client/capture/sequence.h"
+#include "client/replay.h"
 #include "proto/attr.h"
-
-/** Pictures per second where neither the files nor --rate say. */
-#define DEFAULT_RATE_HZ 10.0
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
-    GN_CMD_REPLAY_OPTIONS,
+    GN_REPLAY_OPTIONS,
     {.key = "setup",
      .flag = "setup",
      .type = GN_OPTION_STRING,
@@ -116,41 +111,6 @@ static const char *find_misuse(const struct gn_options *options)
     return NULL;
 }
 
-/** Opens what --sequence or --files names, with its setup. */
-static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
-                       struct gn_probe_setup *setup, struct gn_source **out,
-                       struct gn_error *out_error)
-{
-    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
-    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
-    const char *setup_path = gn_options_get_string(options, NULL, NULL, "setup");
-    const char *projection = gn_options_get_string(options, NULL, NULL, "projection");
-    struct gn_sequence sequence = {0};
-    struct gn_file_list list = {0};
-    int err = 0;
-    gn_probe_setup_init(setup);
-    if (dir) {
-        err = gn_sequence_read(dir, &sequence, out_error);
-        *setup = sequence.probe;
-        list = sequence.environments;
-        memset(&sequence.environments, 0, sizeof(sequence.environments));
-    } else {
-        if (setup_path)
-            err = gn_probe_setup_read_file(setup_path, setup, out_error);
-        else if (projection)
-            err = gn_projection_from_name(projection, &setup->projection.type);
-        if (!err)
-            err = gn_file_list_find(pattern, pace->rate_hz, &list, out_error);
-    }
-    struct gn_file_source_options source_options = {
-        .is_looped = pace->is_looped, .is_12_bit = setup->is_12_bit, .is_8_bit_16 = true};
-    if (!err && gn_file_source_open(&list, &source_options, out) < 0)
-        err = gn_error_set(out_error, -ENOMEM, "out of memory");
-    gn_sequence_finish(&sequence);
-    gn_file_list_finish(&list);
-    return err;
-}
-
 static enum gn_msg_pixel_format get_pixel_format(enum gn_capture_format format)
 {
     switch (format) {
@@ -195,13 +155,10 @@ static int check_capture(const struct gn_probe_setup *setup, const struct gn_cap
 
 /** One run of the command. */
 struct probe {
-    struct gn_client *client;
-    struct gn_source *source;
+    struct gn_replay replay;
     struct gn_probe_setup setup;
     struct gn_msg_environment_frame frame; // what all have in common
     uint64_t first_sequence;
-    int64_t clock_ns; // when the clock was measured
-    long n_sent;
     struct gn_halves halves;
     bool has_told_halves;
 };
@@ -242,99 +199,96 @@ static int get_pixels(struct probe *p, const struct gn_capture *capture, struct 
     return 0;
 }
 
-static int send_capture(struct probe *p, const struct gn_capture *capture,
+/** Opens what --sequence or --files names, with its setup. */
+static int open_source(struct gn_replay *r, const struct gn_options *options,
+                       struct gn_error *out_error)
+{
+    struct probe *p = (struct probe *)r;
+    struct gn_probe_setup *setup = &p->setup;
+    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
+    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
+    const char *setup_path = gn_options_get_string(options, NULL, NULL, "setup");
+    const char *projection = gn_options_get_string(options, NULL, NULL, "projection");
+    struct gn_sequence sequence = {0};
+    struct gn_file_list list = {0};
+    int err = 0;
+    gn_probe_setup_init(setup);
+    if (dir) {
+        err = gn_sequence_read(dir, &sequence, out_error);
+        *setup = sequence.probe;
+        list = sequence.environments;
+        memset(&sequence.environments, 0, sizeof(sequence.environments));
+    } else {
+        if (setup_path)
+            err = gn_probe_setup_read_file(setup_path, setup, out_error);
+        else if (projection)
+            err = gn_projection_from_name(projection, &setup->projection.type);
+        if (!err)
+            err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
+    }
+    gn_sequence_finish(&sequence);
+    make_frame(setup, &p->frame);
+    p->first_sequence = (uint64_t)gn_options_get_int(options, NULL, NULL, "first-sequence");
+    const struct gn_file_source_options source_options = {
+        .is_looped = r->is_looped, .is_12_bit = setup->is_12_bit, .is_8_bit_16 = true};
+    if (!err)
+        err = gn_replay_open_files(r, &list, &source_options, out_error);
+    gn_file_list_finish(&list);
+    return err;
+}
+
+static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
+    struct probe *p = (struct probe *)r;
     struct pixels pixels;
-    int err = get_pixels(p, capture, &pixels, out_error);
+    int err = check_capture(&p->setup, capture, out_error);
+    if (!err)
+        err = gn_replay_wait(r, capture, out_error);
+    if (!err)
+        err = get_pixels(p, capture, &pixels, out_error);
     if (err)
         return err;
     double setup_scale = p->setup.response.scale == 0 ? 1 : p->setup.response.scale;
     p->frame.scale = setup_scale * pixels.scale;
-    p->frame.sequence = p->first_sequence + (uint64_t)p->n_sent;
-    p->frame.capture_time_ns = gn_client_to_server_ns(p->client, gn_client_now_ns());
+    p->frame.sequence = p->first_sequence + (uint64_t)r->n_sent;
+    p->frame.capture_time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
     p->frame.width = (uint32_t)capture->width;
     p->frame.height = (uint32_t)capture->height;
     p->frame.pixel_format = pixels.format;
-    err = gn_client_send_environment(p->client, &p->frame, pixels.data, pixels.n_bytes);
+    err = gn_client_send_environment(r->client, &p->frame, pixels.data, pixels.n_bytes);
     if (err)
-        return gn_cmd_set_fault(p->client, err, out_error);
-    p->n_sent++;
+        return gn_cmd_set_fault(r->client, err, out_error);
+    r->n_sent++;
     printf("environment frame %llu: %s, %dx%d\n", (unsigned long long)p->frame.sequence,
            capture->name, capture->width, capture->height);
     fflush(stdout);
     return 0;
 }
 
-static int stream(struct probe *p, struct gn_cmd_pace *pace, struct gn_error *out_error)
+static int report(struct gn_replay *r, int err, const struct gn_error *error)
 {
-    while (!pace->n_wanted || p->n_sent < pace->n_wanted) {
-        struct gn_capture capture;
-        int got = gn_source_read(p->source, &capture, out_error);
-        if (got < 0)
-            return got;
-        if (got == 0)
-            break;
-        int err = check_capture(&p->setup, &capture, out_error);
-        if (!err)
-            err = gn_cmd_serve_until(p->client, &p->clock_ns,
-                                     gn_cmd_pace_get_due_ns(pace, p->n_sent, capture.time_s),
-                                     out_error);
-        if (!err)
-            err = send_capture(p, &capture, out_error);
-        if (err)
-            return err;
-    }
-    // An ERROR about the last frame is on its way, if there is one.
-    return gn_cmd_serve_until(p->client, &p->clock_ns,
-                              gn_clock_get_monotonic_ns() + GN_CMD_LAST_WORDS_NS, out_error);
-}
-
-/** Runs with everything open; the exit status. */
-static int run(struct probe *p, struct gn_cmd_pace *pace)
-{
-    struct gn_error error = {0};
-    int err = stream(p, pace, &error);
-    bool is_ended = !err || (err == -EINTR && pace->is_looped);
-    if (err == -EINTR && !is_ended)
-        gn_error_set(&error, err, "interrupted");
-    if (!is_ended)
-        gn_cmd_fail(&program, error.text);
-    printf("%ld environment frames sent", p->n_sent);
-    gn_cmd_pace_print(pace);
+    if (err)
+        gn_cmd_fail(&program, error->text);
+    printf("%ld environment frames sent", r->n_sent);
+    gn_replay_print_shift(r);
     printf("\n");
-    return is_ended ? 0 : 1;
+    return err ? 1 : 0;
 }
 
 int gn_cmd_probe(int argc, char *const argv[])
 {
-    struct gn_options *options = NULL;
-    int go = gn_cmd_load(&program, argc, argv, &options);
-    if (go <= 0)
-        return go ? 2 : 0;
-    gn_cmd_catch_signals();
-    struct gn_error error = {0};
+    static const struct gn_replay_command command = {
+        .program = &program,
+        .role = GN_MSG_ROLE_PROBE,
+        .takes_sequences = true,
+        .find_misuse = find_misuse,
+        .open = open_source,
+        .send = send_capture,
+        .report = report,
+    };
     struct probe p = {0};
-    struct gn_cmd_pace pace;
-    bool has_times = gn_options_is_set(options, NULL, NULL, "sequence");
-    const char *misuse = find_misuse(options);
-    int status = 1;
-    gn_cmd_pace_init(&pace, &program, options, has_times ? 0 : DEFAULT_RATE_HZ);
-    if (misuse) {
-        gn_cmd_fail(&program, misuse);
-        status = 2;
-    } else if (open_source(options, &pace, &p.setup, &p.source, &error) < 0 ||
-               gn_cmd_connect(&program, options, GN_MSG_ROLE_PROBE, &p.client, &error) < 0) {
-        gn_cmd_fail(&program, error.text);
-    } else {
-        make_frame(&p.setup, &p.frame);
-        p.first_sequence = (uint64_t)gn_options_get_int(options, NULL, NULL, "first-sequence");
-        p.clock_ns = gn_clock_get_monotonic_ns();
-        status = run(&p, &pace);
-    }
+    int status = gn_replay_run(&command, &p.replay, argc, argv);
     gn_halves_finish(&p.halves);
-    gn_cmd_disconnect(&p.client);
-    gn_source_close(&p.source);
-    gn_options_destroy(&options);
     return status;
 }

@@ -8,14 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/capture/file.h"
-#include "client/cmd.h"
 #include "client/capture/halves.h"
-#include "common/clock.h"
+#include "client/replay.h"
 #include "proto/attr.h"
-
-/** Pictures per second where --rate does not say. */
-#define DEFAULT_RATE_HZ 10.0
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
@@ -41,7 +36,7 @@ static const struct gn_option option_table[] = {
      .default_value = "1",
      .value_name = "X",
      .help = "How bright: factor on the linear picture and the scene's emission_scale."},
-    GN_CMD_PACE_OPTIONS("Without it they go at 10."),
+    GN_REPLAY_PACE_OPTIONS("Without it they go at 10."),
 };
 
 static const struct gn_program program = {
@@ -58,12 +53,9 @@ static const struct gn_program program = {
 
 /** One run of the command. */
 struct screen {
-    struct gn_client *client;
-    struct gn_source *source;
+    struct gn_replay replay;
     struct gn_msg_emitter_frame frame; // what all have in common
     double scale;
-    int64_t clock_ns; // when the clock was measured
-    long n_sent;
     struct gn_halves halves;
 };
 
@@ -84,14 +76,17 @@ static int check_capture(const struct gn_capture *capture, struct gn_error *out_
     return 0;
 }
 
-static int send_capture(struct screen *s, const struct gn_capture *capture,
+static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
+    struct screen *s = (struct screen *)r;
     bool is_linear = capture->format == GN_CAPTURE_RGB_F32;
     const uint8_t *data = capture->data;
     size_t n_bytes = capture->data_bytes;
     double scale = 1;
-    int err = check_capture(capture, out_error);
+    int err = gn_replay_wait(r, capture, out_error);
+    if (!err)
+        err = check_capture(capture, out_error);
     if (err)
         return err;
     if (is_linear) {
@@ -101,104 +96,73 @@ static int send_capture(struct screen *s, const struct gn_capture *capture,
         data = s->halves.data;
         n_bytes = capture->data_bytes / 2;
     }
-    s->frame.sequence = (uint64_t)s->n_sent + 1;
-    s->frame.capture_time_ns = gn_client_to_server_ns(s->client, gn_client_now_ns());
+    s->frame.sequence = (uint64_t)r->n_sent + 1;
+    s->frame.capture_time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
     s->frame.width = (uint32_t)capture->width;
     s->frame.height = (uint32_t)capture->height;
     s->frame.pixel_format = is_linear                            ? GN_MSG_PIXEL_FORMAT_RGB_F16
                             : capture->format == GN_CAPTURE_JPEG ? GN_MSG_PIXEL_FORMAT_JPEG
                                                                  : GN_MSG_PIXEL_FORMAT_RGB8;
     s->frame.scale = s->scale * scale;
-    err = gn_client_send_emitter(s->client, &s->frame, data, n_bytes);
+    err = gn_client_send_emitter(r->client, &s->frame, data, n_bytes);
     if (err)
-        return gn_cmd_set_fault(s->client, err, out_error);
-    s->n_sent++;
+        return gn_cmd_set_fault(r->client, err, out_error);
+    r->n_sent++;
     printf("picture %llu: %s, %dx%d\n", (unsigned long long)s->frame.sequence, capture->name,
            capture->width, capture->height);
     fflush(stdout);
     return 0;
 }
 
-static int stream(struct screen *s, struct gn_cmd_pace *pace, struct gn_error *out_error)
+static int report(struct gn_replay *r, int err, const struct gn_error *error)
 {
-    while (!pace->n_wanted || s->n_sent < pace->n_wanted) {
-        struct gn_capture capture;
-        int got = gn_source_read(s->source, &capture, out_error);
-        if (got < 0)
-            return got;
-        if (got == 0)
-            break;
-        int err =
-            gn_cmd_serve_until(s->client, &s->clock_ns,
-                               gn_cmd_pace_get_due_ns(pace, s->n_sent, capture.time_s), out_error);
-        if (!err)
-            err = send_capture(s, &capture, out_error);
-        if (err)
-            return err;
-    }
-    // An ERROR about the last picture is on its way, if there is one.
-    return gn_cmd_serve_until(s->client, &s->clock_ns,
-                              gn_clock_get_monotonic_ns() + GN_CMD_LAST_WORDS_NS, out_error);
-}
-
-/** Runs with everything open; the exit status. */
-static int run(struct screen *s, struct gn_cmd_pace *pace)
-{
-    struct gn_error error = {0};
-    int err = stream(s, pace, &error);
-    bool is_ended = !err || (err == -EINTR && pace->is_looped);
-    if (err == -EINTR && !is_ended)
-        gn_error_set(&error, err, "interrupted");
-    if (!is_ended)
-        gn_cmd_fail(&program, error.text);
-    if (!is_ended && err != -EINTR)
+    if (err)
+        gn_cmd_fail(&program, error->text);
+    if (err && err != -EINTR)
         return 1; // the server need not have taken what was sent
-    printf("%ld pictures sent", s->n_sent);
-    gn_cmd_pace_print(pace);
+    printf("%ld pictures sent", r->n_sent);
+    gn_replay_print_shift(r);
     printf("\n");
-    return is_ended ? 0 : 1;
+    return err ? 1 : 0;
 }
 
-static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
-                       struct gn_source **out, struct gn_error *out_error)
+static const char *find_misuse(const struct gn_options *options)
 {
+    const char *name = gn_options_get_string(options, NULL, NULL, "stream");
+    if (strlen(name) >= sizeof((struct gn_msg_emitter_frame){0}.stream))
+        return "--stream: names have at most 63 bytes";
+    return NULL;
+}
+
+static int open_source(struct gn_replay *r, const struct gn_options *options,
+                       struct gn_error *out_error)
+{
+    struct screen *s = (struct screen *)r;
     struct gn_file_list list = {0};
-    const struct gn_file_source_options source_options = {.is_looped = pace->is_looped};
-    int err = gn_file_list_find(gn_options_get_string(options, NULL, NULL, "files"), pace->rate_hz,
+    const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
+    s->scale = gn_options_get_double(options, NULL, NULL, "scale");
+    gn_wire_set_string(s->frame.stream, sizeof(s->frame.stream),
+                       gn_options_get_string(options, NULL, NULL, "stream"));
+    int err = gn_file_list_find(gn_options_get_string(options, NULL, NULL, "files"), r->rate_hz,
                                 &list, out_error);
-    if (!err && gn_file_source_open(&list, &source_options, out) < 0)
-        err = gn_error_set(out_error, -ENOMEM, "out of memory");
+    if (!err)
+        err = gn_replay_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);
     return err;
 }
 
 int gn_cmd_screen(int argc, char *const argv[])
 {
-    struct gn_options *options = NULL;
-    int go = gn_cmd_load(&program, argc, argv, &options);
-    if (go <= 0)
-        return go ? 2 : 0;
-    gn_cmd_catch_signals();
-    struct gn_error error = {0};
-    struct screen s = {.scale = gn_options_get_double(options, NULL, NULL, "scale")};
-    struct gn_cmd_pace pace;
-    const char *name = gn_options_get_string(options, NULL, NULL, "stream");
-    int status = 1;
-    gn_cmd_pace_init(&pace, &program, options, DEFAULT_RATE_HZ);
-    if (strlen(name) >= sizeof(s.frame.stream)) {
-        gn_cmd_fail(&program, "--stream: names have at most 63 bytes");
-        status = 2;
-    } else if (open_source(options, &pace, &s.source, &error) < 0 ||
-               gn_cmd_connect(&program, options, GN_MSG_ROLE_SCREEN, &s.client, &error) < 0) {
-        gn_cmd_fail(&program, error.text);
-    } else {
-        gn_wire_set_string(s.frame.stream, sizeof(s.frame.stream), name);
-        s.clock_ns = gn_clock_get_monotonic_ns();
-        status = run(&s, &pace);
-    }
+    static const struct gn_replay_command command = {
+        .program = &program,
+        .role = GN_MSG_ROLE_SCREEN,
+        .find_misuse = find_misuse,
+        .open = open_source,
+        .send = send_capture,
+        .report = report,
+    };
+    struct screen s = {0};
+    int status = gn_replay_run(&command, &s.replay, argc, argv);
     gn_halves_finish(&s.halves);
-    gn_cmd_disconnect(&s.client);
-    gn_source_close(&s.source);
-    gn_options_destroy(&options);
     return status;
 }

@@ -9,16 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/capture/file.h"
 #include "client/capture/sequence.h"
-#include "client/cmd.h"
+#include "client/replay.h"
 #include "client/view/record.h"
 #include "common/clock.h"
 #include "common/text.h"
 #include "proto/attr.h"
 
-/** Pictures per second where neither the files nor --rate say. */
-#define DEFAULT_RATE_HZ 10.0
 /** How long a frame's answer is waited for; of reference quality, which takes minutes. */
 #define ANSWER_NS (60 * GN_NS_PER_S)
 #define REFERENCE_ANSWER_NS (3600 * GN_NS_PER_S)
@@ -29,7 +26,7 @@
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
-    GN_CMD_REPLAY_OPTIONS,
+    GN_REPLAY_OPTIONS,
     {.key = "camera",
      .flag = "camera",
      .type = GN_OPTION_STRING,
@@ -104,18 +101,17 @@ struct pending {
 
 /** One run of the command. */
 struct view {
-    struct gn_client *client;
-    struct gn_source *source;
+    struct gn_replay replay;
+    const char *dir; // borrowed from the options
     struct gn_record *record;
     struct gn_camera camera;
     struct gn_msg_frame frame; // what all frames have in common
     uint64_t sync_light;       // 0: not asked for
-    int64_t clock_ns;          // when the clock was measured
     int64_t first_sent_ns;
     int max_outstanding;
     int n_outstanding;
     struct pending pending[MAX_OUTSTANDING];
-    long n_sent, n_results, n_dropped;
+    long n_results, n_dropped;
     double latency_sum_ms, latency_max_ms;
     char last_drop[256]; // why a frame was dropped
 };
@@ -128,39 +124,6 @@ static const char *find_misuse(const struct gn_options *options)
     if (has_dir == has_files || has_files != gn_options_is_set(options, NULL, NULL, "camera"))
         return "give --sequence DIR, or --files PATTERN with --camera FILE";
     return NULL;
-}
-
-static int open_source(const struct gn_options *options, const struct gn_cmd_pace *pace,
-                       struct view *v, struct gn_error *out_error)
-{
-    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
-    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
-    const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
-    struct gn_sequence sequence = {0};
-    struct gn_file_list list = {0};
-    int err;
-    if (dir) {
-        err = gn_sequence_read(dir, &sequence, out_error);
-        v->camera = sequence.camera;
-        list = sequence.pictures;
-        memset(&sequence.pictures, 0, sizeof(sequence.pictures));
-    } else {
-        err = gn_camera_read_file(camera_path, &v->camera, out_error);
-        if (!err)
-            err = gn_file_list_find(pattern, pace->rate_hz, &list, out_error);
-        for (int i = 0; i < list.n_entries; i++) {
-            list.entries[i].has_pose = true;
-            list.entries[i].world_from_camera = v->camera.world_from_camera;
-        }
-    }
-    struct gn_file_source_options source_options = {.is_looped = pace->is_looped};
-    if (!err)
-        err = gn_file_list_check_names(&list, out_error);
-    if (!err && gn_file_source_open(&list, &source_options, &v->source) < 0)
-        err = gn_error_set(out_error, -ENOMEM, "out of memory");
-    gn_sequence_finish(&sequence);
-    gn_file_list_finish(&list);
-    return err;
 }
 
 static int send_camera(struct view *v)
@@ -183,7 +146,7 @@ static int send_camera(struct view *v)
     };
     gn_cmd_make_response(&c->response, &message.response);
     memcpy(message.matrix_to_rec709, c->response.to_rec709, sizeof(c->response.to_rec709));
-    return gn_client_send_camera(v->client, &message);
+    return gn_client_send_camera(v->replay.client, &message);
 }
 
 static struct pending *find_pending(struct view *v, uint64_t id)
@@ -255,16 +218,16 @@ static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *
     for (;;) {
         if (gn_cmd_is_interrupted())
             return -EINTR;
-        int timeout_ms = gn_cmd_get_timeout_ms(due_ns);
+        int timeout_ms = gn_replay_get_timeout_ms(due_ns);
         bool is_due = timeout_ms == 0;
         if (is_due && v->n_outstanding > max_left)
             timeout_ms = 200;
         struct gn_client_event event;
-        int err, got = gn_client_poll(v->client, timeout_ms, &event);
+        int err, got = gn_client_poll(v->replay.client, timeout_ms, &event);
         if (got < 0)
-            err = gn_cmd_set_fault(v->client, got, out_error);
+            err = gn_cmd_set_fault(v->replay.client, got, out_error);
         else if (got == 0)
-            err = gn_cmd_keep_clock(v->client, &v->clock_ns, out_error);
+            err = gn_replay_keep_clock(&v->replay, out_error);
         else if (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED)
             err = take_answer(v, &event, out_error);
         else
@@ -280,19 +243,24 @@ static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *
 static void set_light_wanted(struct view *v, struct gn_msg_frame *frame)
 {
     int64_t now_ns = gn_client_now_ns();
-    if (v->n_sent == 0)
+    if (v->replay.n_sent == 0)
         v->first_sent_ns = now_ns;
     int64_t left_ms = LIGHT_WAIT_MS - (now_ns - v->first_sent_ns) / GN_NS_PER_MS;
     if (v->sync_light) {
-        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->n_sent;
+        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->replay.n_sent;
         frame->lighting_wait_ms = LIGHT_WAIT_MS;
     } else if (v->n_results == 0 && left_ms > 0) {
         frame->lighting_wait_ms = (uint32_t)left_ms;
     }
 }
 
-static int send_frame(struct view *v, const struct gn_capture *capture, struct gn_error *out_error)
+static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
+                      struct gn_error *out_error)
 {
+    struct view *v = (struct view *)r;
+    int err = serve(v, gn_replay_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
+    if (err)
+        return err;
     bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
     if (!is_jpeg && capture->format != GN_CAPTURE_RGB8)
         return gn_error_set(out_error, -EINVAL,
@@ -304,8 +272,8 @@ static int send_frame(struct view *v, const struct gn_capture *capture, struct g
                             v->camera.height);
     struct pending *p = find_pending(v, 0);
     struct gn_msg_frame frame = v->frame;
-    frame.id = (uint64_t)v->n_sent + 1;
-    frame.capture_time_ns = gn_client_to_server_ns(v->client, gn_client_now_ns());
+    frame.id = (uint64_t)r->n_sent + 1;
+    frame.capture_time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
     frame.views_count = 1;
     frame.views[0] = (struct gn_msg_frame_view){
         .has_world_from_camera = true,
@@ -316,34 +284,17 @@ static int send_frame(struct view *v, const struct gn_capture *capture, struct g
     set_light_wanted(v, &frame);
     *p = (struct pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
-    int err = gn_client_send_frame(v->client, &frame, capture->data, capture->data_bytes);
+    err = gn_client_send_frame(r->client, &frame, capture->data, capture->data_bytes);
     if (err)
-        return gn_cmd_set_fault(v->client, err, out_error);
-    v->n_sent++;
+        return gn_cmd_set_fault(r->client, err, out_error);
+    r->n_sent++;
     v->n_outstanding++;
     return 0;
 }
 
-static int stream(struct view *v, struct gn_cmd_pace *pace, struct gn_error *out_error)
+static int wait_for_answers(struct gn_replay *r, struct gn_error *out_error)
 {
-    int err = send_camera(v);
-    if (err)
-        return gn_cmd_set_fault(v->client, err, out_error);
-    while (!pace->n_wanted || v->n_sent < pace->n_wanted) {
-        struct gn_capture capture;
-        int got = gn_source_read(v->source, &capture, out_error);
-        if (got < 0)
-            return got;
-        if (got == 0)
-            break;
-        int64_t due_ns = gn_cmd_pace_get_due_ns(pace, v->n_sent, capture.time_s);
-        err = serve(v, due_ns, v->max_outstanding - 1, out_error);
-        if (!err)
-            err = send_frame(v, &capture, out_error);
-        if (err)
-            return err;
-    }
-    return serve(v, 0, 0, out_error);
+    return serve((struct view *)r, 0, 0, out_error);
 }
 
 static void set_frame_options(struct view *v, const struct gn_options *options)
@@ -360,57 +311,83 @@ static void set_frame_options(struct view *v, const struct gn_options *options)
         v->sync_light = (uint64_t)gn_options_get_int(options, NULL, NULL, "sync-light");
 }
 
-/** Runs with everything open; the exit status. */
-static int run(struct view *v, struct gn_cmd_pace *pace, const char *dir)
+static int open_source(struct gn_replay *r, const struct gn_options *options,
+                       struct gn_error *out_error)
 {
-    struct gn_error error = {0}, record_error = {0};
-    int err = stream(v, pace, &error);
-    bool is_complete = !err;
-    if (err == -EINTR)
-        err = pace->is_looped ? 0 : gn_error_set(&error, err, "interrupted");
-    if (!err && v->n_results == 0 && v->n_dropped > 0)
-        err = gn_error_set(&error, -ENODATA, "no frame was rendered: %s", v->last_drop);
-    int record_err = gn_record_close(&v->record, v->n_sent, is_complete, &record_error);
+    struct view *v = (struct view *)r;
+    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
+    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
+    const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
+    struct gn_sequence sequence = {0};
+    struct gn_file_list list = {0};
+    int err;
+    if (dir) {
+        err = gn_sequence_read(dir, &sequence, out_error);
+        v->camera = sequence.camera;
+        list = sequence.pictures;
+        memset(&sequence.pictures, 0, sizeof(sequence.pictures));
+    } else {
+        err = gn_camera_read_file(camera_path, &v->camera, out_error);
+        if (!err)
+            err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
+        for (int i = 0; i < list.n_entries; i++) {
+            list.entries[i].has_pose = true;
+            list.entries[i].world_from_camera = v->camera.world_from_camera;
+        }
+    }
+    gn_sequence_finish(&sequence);
+    v->dir = gn_options_get_string(options, NULL, NULL, "out");
+    set_frame_options(v, options);
+    const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
+    if (!err)
+        err = gn_file_list_check_names(&list, out_error);
+    if (!err)
+        err = gn_replay_open_files(r, &list, &source_options, out_error);
+    gn_file_list_finish(&list);
+    return err;
+}
+
+static int begin(struct gn_replay *r, struct gn_error *out_error)
+{
+    struct view *v = (struct view *)r;
+    int err = send_camera(v);
+    return err ? gn_cmd_set_fault(r->client, err, out_error)
+               : gn_record_open(v->dir, &v->record, out_error);
+}
+
+static int report(struct gn_replay *r, int err, const struct gn_error *error)
+{
+    struct view *v = (struct view *)r;
+    struct gn_error drop_error = {0}, record_error = {0};
+    if (!err && v->n_results == 0 && v->n_dropped > 0) {
+        err = gn_error_set(&drop_error, -ENODATA, "no frame was rendered: %s", v->last_drop);
+        error = &drop_error;
+    }
+    int record_err = gn_record_close(&v->record, r->n_sent, r->is_complete, &record_error);
     if (err || record_err)
-        gn_cmd_fail(&program, err ? error.text : record_error.text);
-    printf("%ld frames sent, %ld results, %ld dropped", v->n_sent, v->n_results, v->n_dropped);
+        gn_cmd_fail(&program, err ? error->text : record_error.text);
+    printf("%ld frames sent, %ld results, %ld dropped", r->n_sent, v->n_results, v->n_dropped);
     if (v->n_results)
         printf("; %.1f ms from sending to result (mean), %.1f at most",
                v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
-    gn_cmd_pace_print(pace);
-    printf("; in %s\n", dir);
+    gn_replay_print_shift(r);
+    printf("; in %s\n", v->dir);
     return err || record_err ? 1 : 0;
 }
 
 int gn_cmd_view(int argc, char *const argv[])
 {
-    struct gn_options *options = NULL;
-    int go = gn_cmd_load(&program, argc, argv, &options);
-    if (go <= 0)
-        return go ? 2 : 0;
-    gn_cmd_catch_signals();
-    struct gn_error error = {0};
+    static const struct gn_replay_command command = {
+        .program = &program,
+        .role = GN_MSG_ROLE_VIEWER,
+        .takes_sequences = true,
+        .find_misuse = find_misuse,
+        .open = open_source,
+        .begin = begin,
+        .send = send_frame,
+        .end = wait_for_answers,
+        .report = report,
+    };
     struct view v = {0};
-    struct gn_cmd_pace pace;
-    bool has_times = gn_options_is_set(options, NULL, NULL, "sequence");
-    const char *misuse = find_misuse(options);
-    const char *dir = gn_options_get_string(options, NULL, NULL, "out");
-    int status = 1;
-    gn_cmd_pace_init(&pace, &program, options, has_times ? 0 : DEFAULT_RATE_HZ);
-    set_frame_options(&v, options);
-    if (misuse) {
-        gn_cmd_fail(&program, misuse);
-        status = 2;
-    } else if (open_source(options, &pace, &v, &error) < 0 ||
-               gn_cmd_connect(&program, options, GN_MSG_ROLE_VIEWER, &v.client, &error) < 0 ||
-               gn_record_open(dir, &v.record, &error) < 0) {
-        gn_cmd_fail(&program, error.text);
-    } else {
-        v.clock_ns = gn_clock_get_monotonic_ns();
-        status = run(&v, &pace, dir);
-    }
-    gn_cmd_disconnect(&v.client);
-    gn_source_close(&v.source);
-    gn_options_destroy(&options);
-    return status;
+    return gn_replay_run(&command, &v.replay, argc, argv);
 }

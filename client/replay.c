@@ -1,0 +1,171 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/replay.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "common/clock.h"
+
+/** Lateness that a replay catches up. */
+#define MAX_LATE_NS (2 * GN_NS_PER_S)
+/** How long the server's word on the last picture is waited for. */
+#define LAST_WORDS_NS (200 * GN_NS_PER_MS)
+/** Pictures per second where neither the files nor --rate say. */
+#define DEFAULT_RATE_HZ 10.0
+
+int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
+                         const struct gn_file_source_options *options, struct gn_error *out_error)
+{
+    return gn_file_source_open(list, options, &r->source) < 0
+               ? gn_error_set(out_error, -ENOMEM, "out of memory")
+               : 0;
+}
+
+static void read_pace(struct gn_replay *r, const struct gn_options *options, bool has_times)
+{
+    r->has_start = gn_options_is_set(options, NULL, NULL, "start-at");
+    if (r->has_start) {
+        double start_s = gn_options_get_double(options, NULL, NULL, "start-at");
+        r->start_ns =
+            gn_clock_get_monotonic_ns() + (int64_t)(start_s * 1e9) - gn_clock_get_realtime_ns();
+    }
+    r->rate_hz = has_times ? 0 : DEFAULT_RATE_HZ;
+    if (gn_options_is_set(options, NULL, NULL, "rate"))
+        r->rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
+    r->is_looped = gn_options_get_bool(options, NULL, NULL, "loop");
+    r->n_wanted = gn_options_get_int(options, NULL, NULL, "count");
+}
+
+int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture)
+{
+    double since_start_s = r->rate_hz > 0 ? (double)r->n_sent / r->rate_hz : capture->time_s;
+    int64_t since_start_ns = (int64_t)llround(since_start_s * 1e9);
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    if (!r->has_start) {
+        r->has_start = true;
+        r->start_ns = now_ns - since_start_ns;
+    }
+    int64_t late_ns = now_ns - (r->start_ns + since_start_ns);
+    if (late_ns > (r->n_sent == 0 ? 0 : MAX_LATE_NS)) {
+        if (r->n_sent == 0)
+            fprintf(stderr, "%s: the time to start was %.1f s ago; starting now\n",
+                    r->program->name, (double)late_ns * 1e-9);
+        r->start_ns += late_ns;
+        r->shifted_ns += late_ns;
+    } else if (r->n_sent == 0 && late_ns < -GN_NS_PER_S) {
+        printf("starting in %.1f s\n", (double)-late_ns * 1e-9);
+        fflush(stdout);
+    }
+    return r->start_ns + since_start_ns;
+}
+
+void gn_replay_print_shift(const struct gn_replay *r)
+{
+    if (r->shifted_ns > 0)
+        printf(", %.1f s behind schedule", (double)r->shifted_ns * 1e-9);
+}
+
+int gn_replay_get_timeout_ms(int64_t due_ns)
+{
+    int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();
+    if (left_ns <= 0)
+        return 0;
+    return left_ns > 200 * GN_NS_PER_MS ? 200 : (int)(left_ns / GN_NS_PER_MS) + 1;
+}
+
+int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_error)
+{
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    if (now_ns - r->clock_ns < 60 * GN_NS_PER_S)
+        return 0;
+    r->clock_ns = now_ns;
+    int err = gn_client_sync_clock(r->client, 4, 5000);
+    // A server too busy to answer now leaves us with the clock we have.
+    return err && err != -ETIMEDOUT ? gn_cmd_set_fault(r->client, err, out_error) : 0;
+}
+
+static int serve_until(struct gn_replay *r, int64_t due_ns, struct gn_error *out_error)
+{
+    for (;;) {
+        if (gn_cmd_is_interrupted())
+            return -EINTR;
+        int timeout_ms = gn_replay_get_timeout_ms(due_ns);
+        struct gn_client_event event;
+        int got = gn_client_poll(r->client, timeout_ms, &event);
+        int err = got < 0   ? gn_cmd_set_fault(r->client, got, out_error)
+                  : got > 0 ? gn_cmd_take_event(&event, out_error)
+                            : gn_replay_keep_clock(r, out_error);
+        if (err || (got == 0 && timeout_ms == 0))
+            return err;
+    }
+}
+
+int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
+                   struct gn_error *out_error)
+{
+    return serve_until(r, gn_replay_get_due_ns(r, capture), out_error);
+}
+
+static int stream(const struct gn_replay_command *command, struct gn_replay *r,
+                  struct gn_error *out_error)
+{
+    while (!r->n_wanted || r->n_sent < r->n_wanted) {
+        struct gn_capture capture;
+        int got = gn_source_read(r->source, &capture, out_error);
+        if (got < 0)
+            return got;
+        if (got == 0)
+            break;
+        int err = command->send(r, &capture, out_error);
+        if (err)
+            return err;
+    }
+    if (command->end)
+        return command->end(r, out_error);
+    // An ERROR about the last picture is on its way, if there is one.
+    return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
+}
+
+/** Runs with everything open; the exit status. */
+static int run(const struct gn_replay_command *command, struct gn_replay *r)
+{
+    struct gn_error error = {0};
+    int err = stream(command, r, &error);
+    r->is_complete = !err;
+    if (err == -EINTR) // the only way to end a loop
+        err = r->is_looped ? 0 : gn_error_set(&error, err, "interrupted");
+    return command->report(r, err, &error);
+}
+
+int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,
+                  char *const argv[])
+{
+    struct gn_options *options = NULL;
+    int go = gn_cmd_load(command->program, argc, argv, &options);
+    if (go <= 0)
+        return go ? 2 : 0;
+    gn_cmd_catch_signals();
+    struct gn_error error = {0};
+    const char *misuse = command->find_misuse(options);
+    int status = 1;
+    r->program = command->program;
+    read_pace(r, options,
+              command->takes_sequences && gn_options_is_set(options, NULL, NULL, "sequence"));
+    if (misuse) {
+        gn_cmd_fail(command->program, misuse);
+        status = 2;
+    } else if (command->open(r, options, &error) < 0 ||
+               gn_cmd_connect(command->program, options, command->role, &r->client, &error) < 0 ||
+               (command->begin && command->begin(r, &error) < 0)) {
+        gn_cmd_fail(command->program, error.text);
+    } else {
+        r->clock_ns = gn_clock_get_monotonic_ns();
+        status = run(command, r);
+    }
+    gn_cmd_disconnect(&r->client);
+    gn_source_close(&r->source);
+    gn_options_destroy(&options);
+    return status;
+}

@@ -1,0 +1,129 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What the commands share that send picture after picture: their options, when each picture is due,
+ * the way from the command line to the exit status.
+ */
+#ifndef GN_CLIENT_REPLAY_H
+#define GN_CLIENT_REPLAY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "client/capture/file.h"
+#include "client/cmd.h"
+
+/** Rows of the option table that every command which replays recordings has. */
+#define GN_REPLAY_OPTIONS                                                                          \
+    {.key = "sequence",                                                                            \
+     .flag = "sequence",                                                                           \
+     .type = GN_OPTION_STRING,                                                                     \
+     .value_name = "DIR",                                                                          \
+     .help = "A recorded sequence: the folder that holds sequence.json."},                         \
+        {.key = "files",                                                                           \
+         .flag = "files",                                                                          \
+         .type = GN_OPTION_STRING,                                                                 \
+         .value_name = "PATTERN",                                                                  \
+         .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
+                 "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
+        GN_REPLAY_PACE_OPTIONS("Without it a sequence keeps its own times; files go at 10.")
+
+/** Rows of the option table that every command which replays pictures has; default_rate: a sentence
+ * that says at which rate where --rate is not given. */
+#define GN_REPLAY_PACE_OPTIONS(default_rate)                                                       \
+    {.key = "rate",                                                                                \
+     .flag = "rate",                                                                               \
+     .type = GN_OPTION_DOUBLE,                                                                     \
+     .min = 0.001,                                                                                 \
+     .max = 1000,                                                                                  \
+     .value_name = "HZ",                                                                           \
+     .help = "Pictures per second. " default_rate                                                  \
+             " Up to 2 s late a replay catches up; beyond, the rest is shifted and said."},        \
+        {.key = "start-at",                                                                        \
+         .flag = "start-at",                                                                       \
+         .type = GN_OPTION_DOUBLE,                                                                 \
+         .min = 0,                                                                                 \
+         .max = 9e9,                                                                               \
+         .value_name = "TIME",                                                                     \
+         .help = "When the first picture is sent, in seconds since 1970 (date +%s), so that a "    \
+                 "probe and a viewer can replay in step; default at once. Where it has passed, "   \
+                 "the replay says so and begins with its first picture all the same."},            \
+        {.key = "loop",                                                                            \
+         .flag = "loop",                                                                           \
+         .type = GN_OPTION_BOOL,                                                                   \
+         .default_value = "false",                                                                 \
+         .help = "Begin again at the end, until Ctrl-C."},                                         \
+    {                                                                                              \
+        .key = "count", .flag = "count", .type = GN_OPTION_INT, .min = 1, .max = 1e9,              \
+        .value_name = "N", .help = "Stop after so many pictures."                                  \
+    }
+
+/** One run of a command; each command's own state begins with it. */
+struct gn_replay {
+    const struct gn_program *program;
+    struct gn_client *client; // owned; NULL until connected
+    struct gn_source *source; // owned
+    bool is_looped;
+    double rate_hz;     // 0: the pictures' own times
+    long n_wanted;      // 0: all
+    long n_sent;        // counted by the command
+    bool is_complete;   // the last picture has been sent and the end waited for
+    bool has_start;     // the next field is known
+    int64_t start_ns;   // own monotonic clock, of the first picture
+    int64_t shifted_ns; // by how much the schedule has been moved
+    int64_t clock_ns;   // when the server's clock was measured
+};
+
+/** A command. Where a function returns a negative errno it has set a sentence. */
+struct gn_replay_command {
+    const struct gn_program *program;
+    enum gn_msg_role role;
+    bool takes_sequences; // has GN_REPLAY_OPTIONS
+    /** What is wrong with the options together; NULL: nothing. */
+    const char *(*find_misuse)(const struct gn_options *options);
+    /** Opens the source and reads its options, borrowed for the whole run. */
+    int (*open)(struct gn_replay *r, const struct gn_options *options, struct gn_error *out_error);
+    /** The first messages, once connected; NULL: none. */
+    int (*begin)(struct gn_replay *r, struct gn_error *out_error);
+    /** Waits until the picture is due, sends it and counts it. */
+    int (*send)(struct gn_replay *r, const struct gn_capture *capture, struct gn_error *out_error);
+    /** Waits for the server's last words; NULL: for 200 ms. */
+    int (*end)(struct gn_replay *r, struct gn_error *out_error);
+    /** Says what was done; err, error: how it ended. Returns the exit status. */
+    int (*report)(struct gn_replay *r, int err, const struct gn_error *error);
+};
+
+/** Runs a command with its zeroed state. Returns the exit status. */
+int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,
+                  char *const argv[]);
+
+/** Opens the files as the replay's source. Returns 0, or -ENOMEM and a sentence. */
+GN_MUST_USE int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
+                                     const struct gn_file_source_options *options,
+                                     struct gn_error *out_error);
+
+/**
+ * When the next picture is due, own monotonic clock. Without --start-at the first is due now. A
+ * first picture that is late at all, and a later one that is more than 2 s late, is due now and
+ * shifts all that follow, so that nothing bursts.
+ */
+int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture);
+
+/** Milliseconds to wait in one gn_client_poll: until due_ns, but Ctrl-C must be seen meanwhile. */
+int gn_replay_get_timeout_ms(int64_t due_ns);
+
+/** Measures the clock again where that was a minute ago. Returns 0, or a negative errno and a
+ * sentence: the connection is lost. */
+GN_MUST_USE int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_error);
+
+/**
+ * Serves a connection on which nothing but trouble is expected, and its clock, until the picture is
+ * due. Returns 0, -EINTR (Ctrl-C), or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
+                               struct gn_error *out_error);
+
+/** ", N s behind schedule" to stdout where it was shifted. */
+void gn_replay_print_shift(const struct gn_replay *r);
+
+#endif
