@@ -4,64 +4,43 @@
 
 #include <errno.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
+#include "tests/folder.h"
 #include "tests/meshes.h"
 #include "tests/real_data.h"
+#include "tests/unit/cmocka_setup.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
-
-static char folder[64];
 
 static int set_up(void **state)
 {
     (void)state;
-    (void)snprintf(folder, sizeof(folder), "/tmp/gnomon-mesh-XXXXXX");
-    return mkdtemp(folder) ? 0 : -1;
+    return gn_test_folder_create();
 }
 
 static int tear_down(void **state)
 {
     (void)state;
-    return rmdir(folder); // fails where a test left a file behind
-}
-
-static const char *get_path(const char *name)
-{
-    static char path[128];
-    (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
-    return path;
-}
-
-static void write_file(const char *name, const void *data, size_t size)
-{
-    FILE *file = fopen(get_path(name), "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(data, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
+    return gn_test_folder_remove(NULL, 0); // fails where a test left a file behind
 }
 
 static void remove_file(const char *name)
 {
-    assert_int_equal(unlink(get_path(name)), 0);
+    assert_int_equal(unlink(gn_test_folder_get_path(name)), 0);
 }
 
 /** Reads a mesh file of that text; the file is gone afterwards. */
 static int read_text(const char *name, const char *text, struct gn_mesh *out_mesh,
                      struct gn_error *error)
 {
-    write_file(name, text, strlen(text));
+    gn_test_folder_write_text(name, text);
     *error = (struct gn_error){0};
-    int ret = gn_mesh_read_file(get_path(name), out_mesh, error);
+    int ret = gn_mesh_read_file(gn_test_folder_get_path(name), out_mesh, error);
     remove_file(name);
     return ret;
 }
@@ -170,9 +149,9 @@ static void test_obj_comes_back_as_written(void **state)
     (void)state;
     struct gn_mesh sphere = gn_test_make_sphere(0.1f, 8);
     struct gn_error error = {0};
-    assert_int_equal(gn_mesh_write_obj(&sphere, get_path("s.obj"), &error), 0);
+    assert_int_equal(gn_mesh_write_obj(&sphere, gn_test_folder_get_path("s.obj"), &error), 0);
     struct gn_mesh read = {0};
-    assert_int_equal(gn_mesh_read_file(get_path("s.obj"), &read, &error), 0);
+    assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("s.obj"), &read, &error), 0);
     remove_file("s.obj");
     assert_int_equal(read.n_triangles, sphere.n_triangles);
     assert_float_equal((float)get_area(&read), (float)get_area(&sphere), 1e-6);
@@ -215,7 +194,7 @@ static void test_obj_colours_are_albedos(void **state)
     const char *mtl = "newmtl red\nKd 0.75 0.125 0.0625\n\nnewmtl grey\nKd 0.25 0.25 0.25\n";
     struct gn_mesh mesh = {0};
     struct gn_error error;
-    write_file("c.mtl", mtl, strlen(mtl));
+    gn_test_folder_write_text("c.mtl", mtl);
     assert_int_equal(read_text("c.obj", obj, &mesh, &error), 0);
     assert_int_equal(mesh.n_triangles, 2);
     assert_non_null(mesh.albedos);
@@ -226,7 +205,7 @@ static void test_obj_colours_are_albedos(void **state)
     gn_mesh_finish(&mesh);
 
     mtl = "newmtl red\nKd 1.5 0 0\n\nnewmtl grey\nKd 0.25 0.25 0.25\n";
-    write_file("c.mtl", mtl, strlen(mtl));
+    gn_test_folder_write_text("c.mtl", mtl);
     assert_int_equal(read_text("c.obj", obj, &mesh, &error), -EINVAL);
     assert_non_null(strstr(error.text, "albedo 1.5"));
     assert_non_null(strstr(error.text, "c.obj"));
@@ -264,7 +243,7 @@ static int read_gltf(const char *matrix, const char *base_color, bool has_normal
     memcpy(buffer + 96, cube.triangles, 144);
     memcpy(buffer + 240, normals, 96);
     gn_mesh_finish(&cube);
-    write_file("g.bin", buffer, sizeof(buffer));
+    gn_test_folder_write("g.bin", buffer, sizeof(buffer));
     char text[2048];
     (void)snprintf(
         text, sizeof(text),
@@ -379,13 +358,14 @@ static void test_absent_directory_and_huge(void **state)
     (void)state;
     struct gn_mesh mesh = {0};
     struct gn_error error = {0};
-    assert_int_equal(gn_mesh_read_file(get_path("absent.obj"), &mesh, &error), -ENOENT);
+    assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("absent.obj"), &mesh, &error),
+                     -ENOENT);
     assert_non_null(strstr(error.text, "absent.obj"));
     assert_int_equal(gn_mesh_read_file("/tmp", &mesh, &error), -EINVAL);
     assert_non_null(strstr(error.text, "not a regular file"));
-    write_file("huge.obj", "", 0);
-    assert_int_equal(truncate(get_path("huge.obj"), (off_t)1 << 32), 0);
-    assert_int_equal(gn_mesh_read_file(get_path("huge.obj"), &mesh, &error), -EFBIG);
+    gn_test_folder_write("huge.obj", "", 0);
+    assert_int_equal(truncate(gn_test_folder_get_path("huge.obj"), (off_t)1 << 32), 0);
+    assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("huge.obj"), &mesh, &error), -EFBIG);
     remove_file("huge.obj");
 }
 

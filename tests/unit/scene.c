@@ -1,84 +1,33 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#include "server/scene/scene.h"
-
 #include <errno.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #include "common/pose.h"
 #include "tests/meshes.h"
-
-#define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
-
-static char folder[64];
-static char manifest[128]; // folder/scene.json
-
-static void write_text(const char *path, const char *text)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
-
-static const char *get_path(const char *name)
-{
-    static char path[128];
-    (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
-    return path;
-}
+#include "tests/unit/scene_cases.h"
 
 /** A folder with two meshes: a.obj without colours and red.obj with them. */
 static int set_up(void **state)
 {
     (void)state;
-    (void)snprintf(folder, sizeof(folder), "/tmp/gnomon-scene-XXXXXX");
-    if (!mkdtemp(folder))
+    if (gn_test_folder_create() < 0)
         return -1;
-    (void)snprintf(manifest, sizeof(manifest), "%s/scene.json", folder);
-    write_text(get_path("a.obj"), "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
-    write_text(get_path("red.obj"), "mtllib red.mtl\nusemtl red\n"
-                                    "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
-    write_text(get_path("red.mtl"), "newmtl red\nKd 0.75 0.25 0.125\n");
+    gn_test_folder_write_text("a.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
+    gn_test_folder_write_text("red.obj", "mtllib red.mtl\nusemtl red\n"
+                                         "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
+    gn_test_folder_write_text("red.mtl", "newmtl red\nKd 0.75 0.25 0.125\n");
     return 0;
 }
 
 static int tear_down(void **state)
 {
     (void)state;
-    (void)unlink(get_path("a.obj"));
-    (void)unlink(get_path("red.obj"));
-    (void)unlink(get_path("red.mtl"));
-    (void)unlink(manifest);
-    return rmdir(folder);
-}
-
-static int read_scene(const char *json, struct gn_scene **out_scene, struct gn_error *error)
-{
-    write_text(manifest, json);
-    *error = (struct gn_error){0};
-    return gn_scene_read_file(manifest, NULL, out_scene, error);
-}
-
-/** The surface straight below (x, y, 10). */
-static struct gn_surface look_down(const struct gn_scene *scene, float x, float y)
-{
-    const float org[3] = {x, y, 10.0f};
-    const float down[3] = {0.0f, 0.0f, -1.0f};
-    struct gn_rt_hit hit;
-    struct gn_surface surface;
-    assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, org, down, 0.0f, INFINITY, &hit));
-    gn_scene_get_surface(scene, down, &hit, &surface);
-    return surface;
+    static const char *const names[] = {"a.obj", "red.obj", "red.mtl", "scene.json"};
+    return gn_test_folder_remove(names, LENGTH(names));
 }
 
 static void test_manifest_is_read(void **state)
@@ -108,18 +57,18 @@ static void test_manifest_is_read(void **state)
     assert_string_equal(scene->objects[0].name, "a.obj");
     assert_string_equal(scene->objects[1].name, "a red square");
 
-    struct gn_surface s = look_down(scene, 0.1f, 0.2f);
+    struct gn_surface s = look(scene, 0.1f, 0.2f, false);
     assert_int_equal(s.role, GN_RT_REAL);
     assert_float_equal(s.albedo[0], 0.5f, 0.0); // neither the mesh nor the manifest says more
-    s = look_down(scene, 5.1f, 0.2f);
+    s = look(scene, 5.1f, 0.2f, false);
     assert_int_equal(s.role, GN_RT_VIRTUAL);
     assert_float_equal(s.point[2], 2.0f, 1e-6);
     assert_float_equal(s.albedo[0], 0.75f, 0.0); // the mesh's own
-    assert_float_equal(look_down(scene, 10.1f, 0.2f).albedo[2], 0.125f, 0.0);
-    s = look_down(scene, 15.1f, 0.2f);
+    assert_float_equal(look(scene, 10.1f, 0.2f, false).albedo[2], 0.125f, 0.0);
+    s = look(scene, 15.1f, 0.2f, false);
     assert_int_equal(s.material, GN_MATERIAL_DIFFUSE);
     assert_float_equal(s.albedo[1], 0.2f, 1e-7); // the manifest's
-    s = look_down(scene, 20.1f, 0.2f);
+    s = look(scene, 20.1f, 0.2f, false);
     assert_int_equal(s.material, GN_MATERIAL_MIRROR);
     assert_float_equal(s.albedo[0], 1.0f, 0.0);
     gn_scene_destroy(&scene);
@@ -172,18 +121,8 @@ static void test_manifest_errors_say_where(void **state)
          "0,0,0,1]}]}",
          {"scene.json", "at most"}},
     };
-    for (size_t i = 0; i < LENGTH(cases); i++) {
-        struct gn_scene *scene = NULL;
-        struct gn_error error;
-        int ret = read_scene(cases[i].json, &scene, &error);
-        bool says = strstr(error.text, cases[i].says[0]) && strstr(error.text, cases[i].says[1]) &&
-                    strstr(error.text, manifest) && !strchr(error.text, '\n');
-        if (ret == 0 || !says)
-            print_message("# %s: %d %s\n", cases[i].json, ret, error.text);
-        assert_true(ret < 0);
-        assert_true(says);
-        assert_null(scene);
-    }
+    for (size_t i = 0; i < LENGTH(cases); i++)
+        assert_refused(cases[i].json, cases[i].says);
 #undef OBJECT
 }
 

@@ -1,36 +1,13 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /* What sends light in scene.json: emission, streams and their uvs, lamps. */
-#include "server/scene/scene.h"
-
-#include "tests/unit/cmocka_setup.h"
-
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-#define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
-
-static char folder[64];
-static char manifest[128]; // folder/scene.json
-
-static const char *get_path(const char *name)
-{
-    static char path[128];
-    (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
-    return path;
-}
-
-static void write_text(const char *path, const char *text)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
+#include "tests/unit/scene_cases.h"
 
 static const char *const meshes[][2] = {
     {"plain.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"},
@@ -44,41 +21,20 @@ static const char *const meshes[][2] = {
 static int set_up(void **state)
 {
     (void)state;
-    (void)snprintf(folder, sizeof(folder), "/tmp/gnomon-scene-XXXXXX");
-    if (!mkdtemp(folder))
+    if (gn_test_folder_create() < 0)
         return -1;
-    (void)snprintf(manifest, sizeof(manifest), "%s/scene.json", folder);
     for (size_t i = 0; i < LENGTH(meshes); i++)
-        write_text(get_path(meshes[i][0]), meshes[i][1]);
+        gn_test_folder_write_text(meshes[i][0], meshes[i][1]);
     return 0;
 }
 
 static int tear_down(void **state)
 {
     (void)state;
+    const char *names[LENGTH(meshes) + 1] = {"scene.json"};
     for (size_t i = 0; i < LENGTH(meshes); i++)
-        (void)unlink(get_path(meshes[i][0]));
-    (void)unlink(manifest);
-    return rmdir(folder);
-}
-
-static int read_scene(const char *json, struct gn_scene **out_scene, struct gn_error *error)
-{
-    write_text(manifest, json);
-    *error = (struct gn_error){0};
-    return gn_scene_read_file(manifest, NULL, out_scene, error);
-}
-
-/** The surface straight below (x, y, 10), or above (x, y, -10). */
-static struct gn_surface look(const struct gn_scene *scene, float x, float y, bool upwards)
-{
-    const float org[3] = {x, y, upwards ? -10.0f : 10.0f};
-    const float dir[3] = {0.0f, 0.0f, upwards ? 1.0f : -1.0f};
-    struct gn_rt_hit hit;
-    struct gn_surface surface;
-    assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, org, dir, 0.0f, INFINITY, &hit));
-    gn_scene_get_surface(scene, dir, &hit, &surface);
-    return surface;
+        names[i + 1] = meshes[i][0];
+    return gn_test_folder_remove(names, LENGTH(names));
 }
 
 static void assert_uv(const struct gn_scene *scene, float x, float y, double u, double v)
@@ -179,18 +135,8 @@ static void test_errors_say_where(void **state)
     };
 #undef MATERIAL
 #undef LIGHT
-    for (size_t i = 0; i < LENGTH(cases); i++) {
-        struct gn_scene *scene = NULL;
-        struct gn_error error;
-        int ret = read_scene(cases[i].json, &scene, &error);
-        bool says = strstr(error.text, cases[i].says[0]) && strstr(error.text, cases[i].says[1]) &&
-                    strstr(error.text, manifest) && !strchr(error.text, '\n');
-        if (ret == 0 || !says)
-            print_message("# %s: %d %s\n", cases[i].json, ret, error.text);
-        assert_true(ret < 0);
-        assert_true(says);
-        assert_null(scene);
-    }
+    for (size_t i = 0; i < LENGTH(cases); i++)
+        assert_refused(cases[i].json, cases[i].says);
 }
 
 int main(void)
