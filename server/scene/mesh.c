@@ -16,6 +16,13 @@ void gn_mesh_finish(struct gn_mesh *mesh)
     free(mesh->uvs);
     free(mesh->triangles);
     free(mesh->albedos);
+    free(mesh->tangents);
+    free(mesh->materials);
+    free(mesh->material);
+    for (int i = 0; i < mesh->n_textures; i++)
+        gn_texture_finish(&mesh->textures[i]);
+    free(mesh->textures);
+    free(mesh->ignored);
     *mesh = (struct gn_mesh){0};
 }
 
@@ -42,6 +49,48 @@ static int check_vertices(const struct gn_mesh *mesh, struct gn_error *out_error
                                 length);
     }
     return 0;
+}
+
+static int check_tangents(const struct gn_mesh *mesh, struct gn_error *out_error)
+{
+    for (int i = 0; mesh->tangents && i < mesh->n_vertices; i++) {
+        const float *t = mesh->tangents + 4 * (size_t)i;
+        double length = sqrt((double)t[0] * t[0] + (double)t[1] * t[1] + (double)t[2] * t[2]);
+        if (!(fabs(length - 1.0) < 1e-3) || (t[3] != 1.0f && t[3] != -1.0f))
+            return gn_error_set(out_error, -EINVAL,
+                                "tangent %d has length %g and sign %g; they must be 1 and 1 or -1",
+                                i, length, (double)t[3]);
+    }
+    return 0;
+}
+
+static int check_materials(struct gn_mesh *mesh, struct gn_error *out_error)
+{
+    if (!mesh->material)
+        return 0;
+    if (!mesh->materials || mesh->n_materials < 1 || mesh->n_materials > GN_MESH_MAX_MATERIALS)
+        return gn_error_set(out_error, -EINVAL, "%d materials; a mesh may have 1 to %d",
+                            mesh->n_materials, GN_MESH_MAX_MATERIALS);
+    for (int i = 0; i < mesh->n_materials; i++) {
+        struct gn_error reason = {0};
+        if (gn_mesh_material_check(&mesh->materials[i], &reason) < 0)
+            return gn_error_set(out_error, -EINVAL, "material %d: %s", i, reason.text);
+    }
+    for (int i = 0; i < mesh->n_triangles; i++) {
+        if (mesh->material[i] >= mesh->n_materials)
+            return gn_error_set(out_error, -EINVAL, "triangle %d names material %d of %d", i,
+                                mesh->material[i], mesh->n_materials);
+    }
+    return 0;
+}
+
+bool gn_mesh_has_cutouts(const struct gn_mesh *mesh)
+{
+    for (int i = 0; mesh->material && i < mesh->n_materials; i++) {
+        if (mesh->materials[i].alpha_cutoff > 0)
+            return true;
+    }
+    return false;
 }
 
 static int check_triangles(const struct gn_mesh *mesh, struct gn_error *out_error)
@@ -95,6 +144,8 @@ static int drop_degenerate(struct gn_mesh *mesh)
         if (mesh->albedos)
             memmove(mesh->albedos + 3 * (size_t)kept, mesh->albedos + 3 * (size_t)i,
                     3 * sizeof(float));
+        if (mesh->material)
+            mesh->material[kept] = mesh->material[i];
         kept++;
     }
     int dropped = mesh->n_triangles - kept;
@@ -112,6 +163,10 @@ int gn_mesh_check(struct gn_mesh *mesh, int *out_dropped, struct gn_error *out_e
     int ret = check_vertices(mesh, out_error);
     if (ret == 0)
         ret = check_triangles(mesh, out_error);
+    if (ret == 0)
+        ret = check_tangents(mesh, out_error);
+    if (ret == 0)
+        ret = check_materials(mesh, out_error);
     if (ret < 0)
         return ret;
     int dropped = drop_degenerate(mesh);

@@ -7,13 +7,20 @@
 #ifndef GN_SERVER_SCENE_MESH_H
 #define GN_SERVER_SCENE_MESH_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/error.h"
 #include "proto/attr.h"
+#include "server/scene/material.h"
 
 /** Most triangles one mesh may have. */
 #define GN_MESH_MAX_TRIANGLES (1 << 25)
+/** Most materials and pictures of one mesh. */
+#define GN_MESH_MAX_MATERIALS 4096
+#define GN_MESH_MAX_TEXTURES 256
+/** Most texels of one mesh's pictures together. */
+#define GN_MESH_MAX_TEXELS (1L << 27)
 
 /** An indexed triangle mesh in object coordinates, m. Caller's memory, our arrays (malloc). */
 struct gn_mesh {
@@ -24,7 +31,18 @@ struct gn_mesh {
     float *uvs;          // [n_vertices][2], v upwards, as the file has them; may be NULL: none
     uint32_t *triangles; // [n_triangles][3], each < n_vertices; counter-clockwise seen from outside
     float *albedos;      // [n_triangles][3], [0, 1]; may be NULL: the object's material
+    // Of a glTF file; the object's own material comes before them, they before albedos.
+    float *tangents; // [n_vertices][4], unit and the bitangent's sign; may be NULL: no normal maps
+    int n_materials;
+    struct gn_mesh_material *materials; // [n_materials]; may be NULL: none
+    uint16_t *material;                 // [n_triangles], each < n_materials; NULL: no materials
+    int n_textures;
+    struct gn_texture *textures; // [n_textures]
+    char *ignored;               // what the file asks for that is not done, one line; may be NULL
 };
+
+/** True where parts of triangles may be cut out by their material's alpha. */
+bool gn_mesh_has_cutouts(const struct gn_mesh *mesh);
 
 /** Frees the arrays and zeroes *mesh. */
 void gn_mesh_finish(struct gn_mesh *mesh);

@@ -10,9 +10,6 @@
 #include "common/pose.h"
 #include "server/scene/emission.h"
 
-// Reflectance of a diffuse object whose file and manifest say nothing.
-#define DEFAULT_ALBEDO 0.5f
-
 static void finish_objects(struct gn_scene_object *objects, int n_objects)
 {
     for (int i = 0; i < n_objects; i++) {
@@ -36,21 +33,14 @@ void gn_scene_destroy(struct gn_scene **scene)
     free(self);
 }
 
-static int check_material(const struct gn_scene_object *object, int index,
-                          struct gn_error *out_error)
+static int check_material(struct gn_scene_object *object, int index, struct gn_error *out_error)
 {
+    struct gn_error reason = {0};
     if (object->role != GN_RT_REAL && object->role != GN_RT_VIRTUAL)
         return gn_error_set(out_error, -EINVAL, "object %d: its role is neither real nor virtual",
                             index);
-    if (!object->has_material)
-        return 0;
-    if (object->material.type != GN_MATERIAL_DIFFUSE && object->material.type != GN_MATERIAL_MIRROR)
-        return gn_error_set(out_error, -EINVAL, "object %d: unknown material type %d", index,
-                            (int)object->material.type);
-    for (int k = 0; k < 3; k++) {
-        if (!(object->material.albedo[k] >= 0.0f && object->material.albedo[k] <= 1.0f))
-            return gn_error_set(out_error, -EINVAL, "object %d: albedo must lie in [0, 1]", index);
-    }
+    if (object->has_material && gn_material_check(&object->material, &reason) < 0)
+        return gn_error_set(out_error, -EINVAL, "object %d: %s", index, reason.text);
     return 0;
 }
 
@@ -91,6 +81,20 @@ static int check_emitter_count(const struct gn_scene_object *objects, int n_obje
                               n, GN_SCENE_MAX_EMITTERS);
 }
 
+/** Bits of the types that the object's triangles are of. */
+static unsigned get_types(const struct gn_scene_object *object)
+{
+    const struct gn_mesh *mesh = &object->mesh;
+    unsigned types = 0;
+    if (object->has_material)
+        return 1u << object->material.type;
+    if (!mesh->material)
+        return 1u << GN_MATERIAL_DIFFUSE;
+    for (int i = 0; i < mesh->n_triangles; i++)
+        types |= 1u << mesh->materials[mesh->material[i]].factors.type;
+    return types;
+}
+
 static int add_object(struct gn_scene *scene, int index, struct gn_error *out_error)
 {
     struct gn_scene_object *object = &scene->objects[index];
@@ -101,6 +105,9 @@ static int add_object(struct gn_scene *scene, int index, struct gn_error *out_er
         return gn_error_set(out_error, ret, "object %d (%s): %s", index,
                             object->name ? object->name : "no name", reason.text);
     fill_normal_matrix(object);
+    unsigned *types =
+        object->role == GN_RT_REAL ? &scene->real_materials : &scene->virtual_materials;
+    *types |= get_types(object);
     int *count =
         object->role == GN_RT_REAL ? &scene->n_real_triangles : &scene->n_virtual_triangles;
     if (object->mesh.n_triangles > GN_SCENE_MAX_TRIANGLES - *count)
@@ -191,80 +198,4 @@ int gn_scene_set_lights(struct gn_scene *scene, const struct gn_scene_light *lig
     scene->lights = copy;
     scene->n_lights = n_lights;
     return 0;
-}
-
-static float dot(const float a[static 3], const float b[static 3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/** The interpolated normal in world, unit; false where it has no direction. */
-static bool get_shading_normal(const struct gn_scene_object *object, const struct gn_rt_hit *hit,
-                               float out_normal[static 3])
-{
-    const struct gn_mesh *mesh = &object->mesh;
-    if (!mesh->normals)
-        return false;
-    const uint32_t *index = mesh->triangles + 3 * (size_t)hit->triangle;
-    const float weights[3] = {1.0f - hit->u - hit->v, hit->u, hit->v};
-    double n[3] = {0};
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++)
-            n[k] += (double)weights[i] * mesh->normals[3 * (size_t)index[i] + (size_t)k];
-    }
-    const double *m = object->normal_matrix;
-    double world[3];
-    double sum = 0.0;
-    for (int k = 0; k < 3; k++) {
-        world[k] = m[3 * k] * n[0] + m[3 * k + 1] * n[1] + m[3 * k + 2] * n[2];
-        sum += world[k] * world[k];
-    }
-    if (!(sum > 0.0))
-        return false;
-    double scale = 1.0 / sqrt(sum);
-    for (int k = 0; k < 3; k++)
-        out_normal[k] = (float)(world[k] * scale);
-    return true;
-}
-
-static void get_uv(const struct gn_mesh *mesh, const struct gn_rt_hit *hit, float out_uv[static 2])
-{
-    const uint32_t *index = mesh->triangles + 3 * (size_t)hit->triangle;
-    for (int k = 0; k < 2 && mesh->uvs; k++)
-        out_uv[k] = (1.0f - hit->u - hit->v) * mesh->uvs[2 * (size_t)index[0] + (size_t)k] +
-                    hit->u * mesh->uvs[2 * (size_t)index[1] + (size_t)k] +
-                    hit->v * mesh->uvs[2 * (size_t)index[2] + (size_t)k];
-}
-
-void gn_scene_get_surface(const struct gn_scene *scene, const float dir[static 3],
-                          const struct gn_rt_hit *hit, struct gn_surface *out_surface)
-{
-    const struct gn_scene_object *object = &scene->objects[hit->object];
-    struct gn_surface s = {
-        .clearance = hit->clearance, .role = object->role, .object = hit->object};
-    float side = dot(hit->normal, dir) > 0.0f ? -1.0f : 1.0f;
-    s.is_front = side > 0.0f; // rt's normal is the outside's, also where the matrix mirrors
-    get_uv(&object->mesh, hit, s.uv);
-    for (int k = 0; k < 3; k++) {
-        s.point[k] = hit->point[k];
-        s.normal_geometric[k] = side * hit->normal[k];
-    }
-    memcpy(s.normal_shading, s.normal_geometric, sizeof(s.normal_shading));
-    float shading[3];
-    if (get_shading_normal(object, hit, shading)) {
-        // To the side of the geometric normal: files have normals and windings that disagree.
-        float same = dot(shading, s.normal_geometric) < 0.0f ? -1.0f : 1.0f;
-        for (int k = 0; k < 3; k++)
-            s.normal_shading[k] = same * shading[k];
-    }
-    const float *albedos = object->mesh.albedos;
-    for (int k = 0; k < 3; k++) {
-        s.albedo[k] = DEFAULT_ALBEDO;
-        if (object->has_material)
-            s.albedo[k] = object->material.albedo[k];
-        else if (albedos)
-            s.albedo[k] = albedos[3 * (size_t)hit->triangle + (size_t)k];
-    }
-    s.material = object->has_material ? object->material.type : GN_MATERIAL_DIFFUSE;
-    *out_surface = s;
 }

@@ -11,6 +11,7 @@
 #include "common/error.h"
 #include "common/pool.h"
 #include "proto/attr.h"
+#include "server/scene/material.h"
 #include "server/scene/mesh.h"
 #include "server/scene/rt.h"
 
@@ -18,8 +19,6 @@
 #define GN_SCENE_MAX_OBJECTS 4096
 /** Most triangles of either role. */
 #define GN_SCENE_MAX_TRIANGLES (1 << 27)
-
-enum gn_material_type { GN_MATERIAL_DIFFUSE = 0, GN_MATERIAL_MIRROR = 1 };
 
 /** How real light reaches the scene (the paper's sections 3.2 and 3.1). */
 enum gn_scene_model {
@@ -36,18 +35,12 @@ enum gn_scene_model {
 /** Longest name of a stream. */
 #define GN_SCENE_MAX_STREAM 63
 
-/** What an object is made of. */
-struct gn_material {
-    enum gn_material_type type;
-    float albedo[3]; // [0, 1]; diffuse: reflectance; mirror: reflectance for each channel
-};
-
 /** One object. `mesh` in object coordinates. */
 struct gn_scene_object {
     char *name;          // the mesh's file name or the manifest's "name"; owned
     enum gn_rt_set role; // GN_RT_REAL or GN_RT_VIRTUAL
     struct gn_material material;
-    bool has_material; // false: the mesh's own albedos, or diffuse 0.5
+    bool has_material; // false: the mesh's own materials or albedos, or diffuse 0.5
     /**
      * Radiance that it sends from its outside, W/(sr m^2), >= 0; diffuse objects only. With a
      * stream: what it sends while there is no picture. The outside is where triangles are seen
@@ -79,12 +72,15 @@ struct gn_scene {
     struct gn_scene_light *lights; // [n_lights], owned
     int n_real_triangles;
     int n_virtual_triangles;
+    unsigned real_materials; // bit 1 << type: some triangle is of it
+    unsigned virtual_materials;
 };
 
 /**
  * Reads scene.json (docs/frames.md) and all meshes, and commits:
  *   {"objects": [{"mesh": "a.obj", "role": "virtual" or "real", "name": "a",
- *                 "material": {"type": "diffuse" or "mirror", "albedo": [r, g, b],
+ *                 "material": {"type": "diffuse", "mirror", "glass" or "ggx",
+ *                              "albedo": [r, g, b], "roughness": 0, "metallic": 0, "ior": 1.5,
  *                              "emission": [r, g, b], "emission_stream": "tv",
  *                              "emission_scale": 1},
  *                 "world_from_object": [16 numbers, row-major]}],
@@ -120,9 +116,18 @@ void gn_scene_destroy(struct gn_scene **scene);
 struct gn_surface {
     float point[3];            // m, world
     float clearance;           // m, for gn_rt_offset_origin
-    float normal_geometric[3]; // unit, turned to the side the ray came from
-    float normal_shading[3];   // unit, interpolated; to the geometric normal's side
+    float normal_geometric[3]; // unit, the triangle's, turned to the side the ray came from
+    /**
+     * What light may come from: unit, to the geometric normal's side. Interpolated where the mesh
+     * has normals, since it then stands for a smooth surface, which a mesh does not hide from light
+     * that only its facet turns away from; else the geometric one.
+     */
+    float normal_horizon[3];
+    float normal_shading[3]; // unit; the horizon's, or by a normal map
+    float lift[3];           // m, from point to the smooth surface, outwards; 0 where there is none
     float albedo[3];
+    float emission[3]; // W/(sr m^2), of the mesh file's material
+    float roughness, metallic, ior;
     enum gn_material_type material;
     enum gn_rt_set role;
     uint32_t object;
@@ -130,8 +135,18 @@ struct gn_surface {
     float uv[2];   // the mesh's; 0 where it has none
 };
 
-/** Evaluates a hit of a ray with unit direction dir. Thread-safety: safe. */
+/** Evaluates a hit of a ray with unit direction dir; pictures by their finest level. Thread-safety:
+ * safe. */
 void gn_scene_get_surface(const struct gn_scene *scene, const float dir[static 3],
                           const struct gn_rt_hit *hit, struct gn_surface *out_surface);
+/** The same with pictures averaged over a footprint across the ray, m. */
+void gn_scene_get_surface_filtered(const struct gn_scene *scene, const float dir[static 3],
+                                   const struct gn_rt_hit *hit, float footprint,
+                                   struct gn_surface *out_surface);
+
+/** Where rays start that leave the surface to the side it is seen from. */
+void gn_surface_get_origin(const struct gn_surface *surface, float out_org[static 3]);
+/** Where rays start that go through the surface. */
+void gn_surface_get_origin_behind(const struct gn_surface *surface, float out_org[static 3]);
 
 #endif
