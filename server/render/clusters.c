@@ -30,6 +30,7 @@ struct build {
     int n;
     int first[MAX_CLUSTERS], size[MAX_CLUSTERS];
     bool is_whole[MAX_CLUSTERS]; // cannot be cut
+    int part[MAX_CLUSTERS];      // the cluster that it was cut from at first
 };
 
 /** World corners of a triangle, rounded as rt rounds them. */
@@ -87,6 +88,7 @@ static bool cut(struct build *build, int c, int other)
     build->size[c] = n_near;
     build->first[other] = build->first[c] + n_near;
     build->size[other] = n - n_near;
+    build->part[other] = build->part[c];
     return true;
 }
 
@@ -122,6 +124,43 @@ static int gather(struct build *build, enum gn_rt_set role)
             build->members[build->n++] = (struct member){i, t};
     }
     return n_clusters;
+}
+
+/** True where the cluster is of one object and lies in one plane, but for rounding. */
+static bool is_flat(const struct build *build, int c)
+{
+    const struct member *members = build->members + build->first[c];
+    double origin[3] = {0};
+    double n[3] = {0};
+    double size = 0; // squared, of the largest triangle so far
+    for (int round = 0; round < 2; round++) {
+        for (int i = 0; i < build->size[c]; i++) {
+            float p[3][3];
+            double e[2][3];
+            if (members[i].object != members[0].object)
+                return false;
+            get_corners(build->scene, members[i], p);
+            for (int j = 0; j < 6; j++)
+                e[j / 3][j % 3] = (double)p[1 + j / 3][j % 3] - p[0][j % 3];
+            const double cross[3] = {e[0][1] * e[1][2] - e[0][2] * e[1][1],
+                                     e[0][2] * e[1][0] - e[0][0] * e[1][2],
+                                     e[0][0] * e[1][1] - e[0][1] * e[1][0]};
+            double area2 = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
+            for (int k = 0; k < 3 && round == 0 && area2 > size; k++) {
+                n[k] = cross[k] / sqrt(area2);
+                origin[k] = p[0][k];
+            }
+            size = round == 0 ? fmax(size, area2) : size;
+            for (int j = 0; j < 3 && round == 1; j++) {
+                double height = 0;
+                for (int k = 0; k < 3; k++)
+                    height += n[k] * (p[j][k] - origin[k]);
+                if (fabs(height) > 1e-6 * sqrt(sqrt(size)))
+                    return false;
+            }
+        }
+    }
+    return true;
 }
 
 static int cut_all(struct build *build, int n_clusters)
@@ -174,6 +213,7 @@ static void fill_cluster(const struct build *build, int c, struct clusters *out)
     if (!keeps)
         keep_box(&cluster->box, out);
     cluster->has_edges = keeps;
+    cluster->is_flat = out->is_flat[build->part[c]];
     cluster->n_vertices = out->n_vertices - cluster->first_vertex;
 }
 
@@ -189,6 +229,10 @@ int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct c
     ret = gather(build, role);
     if (ret < 0)
         goto out;
+    for (int c = 0; c < ret; c++) {
+        build->part[c] = c;
+        out->is_flat[c] = is_flat(build, c);
+    }
     int n_clusters = cut_all(build, ret);
     for (int k = 0; k < 3; k++) {
         out->vertices[k] = malloc(MAX_CLUSTERS * 3 * CLUSTER_TRIANGLES * sizeof(float));

@@ -2,10 +2,10 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * What the passes of one frame share. A frame goes through in tiles (tiles.c); a tile's samples go
- * through in batches: primary.c finds what each sees, shade.c and shadow.c (or reference.c for both)
- * find its light, refine.c says which pixels need more samples, layers.c makes pixels of samples.
- * A frame is const while the workers run; each worker owns one scratch. Sums are in double and in
- * the order of the lights, so the bits do not depend on the number of workers.
+ * through in batches: primary.c finds what each sees, shade.c and shadow.c (or reference.c for
+ * both) find its light, refine.c says which pixels need more samples, layers.c makes pixels of
+ * samples. A frame is const while the workers run; each worker owns one scratch. Sums are in double
+ * and in the order of the lights, so the bits do not depend on the number of workers.
  */
 #ifndef GN_SERVER_RENDER_INTERNAL_H
 #define GN_SERVER_RENDER_INTERNAL_H
@@ -32,6 +32,8 @@
 #define MAX_OUTLINES (2 * MAX_CLUSTERS * CLUSTER_TRIANGLES * 3)
 /** Directions of a group: 16 blocks of 16. */
 #define GROUP (LANES * LANES)
+
+struct silhouette;
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
 
@@ -125,6 +127,7 @@ struct cluster {
     struct box box;               // exact
     int first_vertex, n_vertices; // three for each triangle; of many triangles: the box's corners
     bool has_edges;               // false: of too many triangles
+    bool is_flat;                 // of one object, which lies in one plane
     int first_edge, n_edges;
 };
 
@@ -132,7 +135,8 @@ struct cluster {
 struct edge {
     float ends[6];
     float apex[2][3];
-    bool has_two; // triangles; else one, or more than two, and apex says nothing
+    float normal[2][3]; // unit, of the plane of both ends and an apex; 0: there is none
+    bool has_two;       // triangles; else one, or more than two, and apex says nothing
     int cluster;
 };
 
@@ -162,8 +166,9 @@ struct clusters {
     int n;
     struct cluster cluster[MAX_CLUSTERS];
     int n_vertices;
-    float *vertices[3]; // world, owned
-    struct edge *edges; // owned; an edge of triangles of two clusters is in one of them
+    float *vertices[3];         // world, owned
+    bool is_flat[MAX_CLUSTERS]; // of the objects' first clusters, which are also the blockers
+    struct edge *edges;         // owned; an edge of triangles of two clusters is in one of them
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -246,6 +251,8 @@ struct frame {
     int n_blockers;
     const struct clusters *clusters; // [2]: real, virtual
     float margin;                    // m, by which boxes are widened
+    // By role, NULL: not made. The real ones are without what is flat.
+    const struct silhouette *real_silhouettes, *virtual_silhouettes; // [lights->n]
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
     struct near_lights near;         // of the state; reference: finer
     const struct places *places;     // reference in the global model; else none

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/render/silhouette.h"
 
 #define DEFAULT_PATHS 256
 #define MAX_PATHS 65536
@@ -32,6 +33,7 @@ struct gn_renderer {
     struct box blockers[MAX_BLOCKERS], wide_blockers[MAX_BLOCKERS]; // [n_blockers]
     int n_blockers;
     struct clusters clusters[2]; // real, virtual
+    struct silhouettes silhouettes[2];
 };
 
 int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
@@ -76,8 +78,10 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
         free(self->scratches[i].cut_places);
     }
     free(self->scratches);
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
         gn_clusters_finish(&self->clusters[i]);
+        gn_silhouettes_finish(&self->silhouettes[i]);
+    }
     gn_render_lights_finish(&self->lights);
     gn_near_store_finish(&self->near);
     gn_places_finish(&self->places);
@@ -273,6 +277,26 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     init_light(frame);
 }
 
+/** Silhouettes for the shadow pass that the plan has; the reference has ways of its own. */
+static int make_silhouettes(struct gn_renderer *renderer, struct frame *frame)
+{
+    if (!frame->run_shadow || !frame->cull || frame->options.quality == GN_QUALITY_REFERENCE)
+        return 0;
+    for (int i = 0; i < 2; i++) {
+        bool is_real = i == 0;
+        const struct silhouette **out =
+            is_real ? &frame->real_silhouettes : &frame->virtual_silhouettes;
+        if (is_real && !frame->run_blockers)
+            continue;
+        int ret = gn_silhouettes_make(&renderer->silhouettes[i], &renderer->clusters[i], is_real,
+                                      frame->lights, frame->margin, renderer->pool);
+        if (ret < 0)
+            return ret;
+        *out = renderer->silhouettes[i].of;
+    }
+    return 0;
+}
+
 static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
                    const struct gn_blend *blend, enum gn_quality quality, struct gn_layers *layers,
                    struct gn_error *out_error)
@@ -326,6 +350,9 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
         return gn_error_set(out_error, ret, "render: out of memory");
     init_frame(&frame, renderer);
     gn_plan_make(&frame, renderer->slopes, &report);
+    ret = make_silhouettes(renderer, &frame);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
 
     gn_tiles_render(&frame, renderer->pool);

@@ -8,14 +8,17 @@
  * light, which do real objects hide; the sums, in the order of the lights.
  *
  * Receivers go through in blocks of 16 neighbours. Left out, and no bit of the result with them,
- * are rays that surely meet nothing: a light whose rays from a block's box miss the virtual
- * objects' box; for real objects, the same with each object's box, and before that objects that
- * lie wholly under the tangent planes of all receivers, such as the table that they are points of.
+ * are rays that surely meet nothing or surely something, by the silhouette that the objects have
+ * from the light (silhouette.c): of a tile, of a block, then of each receiver. Flat real objects,
+ * such as the table that the receivers are points of, are in no silhouette: they are left out where
+ * they lie under the tangent planes of all receivers, or by their boxes.
  */
 #include "server/render/internal.h"
 
 #include <math.h>
 #include <string.h>
+
+#include "server/render/silhouette.h"
 
 static void grow_box(struct box *box, const float p[static 3])
 {
@@ -100,22 +103,56 @@ static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt
 
 /** Rays of a block's lanes to one light. */
 static void trace_block(const struct frame *frame, struct scratch *scratch, int block, int light,
-                        const float dir[static 3], enum gn_rt_set set,
+                        const float dir[static 3], unsigned lanes, enum gn_rt_set set,
                         uint16_t (*masks)[GN_LIGHTS_MAX], struct tile_figures *figures)
 {
     const struct receivers *r = &scratch->receivers;
-    float cosines[LANES];
-    get_cosines(r, block, dir, cosines);
-    for (int i = 0; i < LANES; i++) {
-        int j = block * LANES + i;
+    for (; lanes != 0; lanes &= lanes - 1) {
+        int j = block * LANES + __builtin_ctz(lanes);
         const float org[3] = {r->org[0][j], r->org[1][j], r->org[2][j]};
-        if (!(cosines[i] > 0) || (set == GN_RT_REAL && !(r->wanted[block] >> i & 1)))
-            continue;
-        if (frame->cull && set == GN_RT_VIRTUAL && !gn_box_may_meet(&frame->virtual_box, org, dir))
-            continue;
         if (gn_packet_add(scratch, org, dir, j, light, 0, INFINITY))
             flush(frame, scratch, set, masks, figures);
     }
+}
+
+/** Bit i: lane i is above the horizon of the light, and of `lanes`. */
+static unsigned get_lit_lanes(const struct receivers *r, int block, const float dir[static 3],
+                              unsigned lanes)
+{
+    float cosines[LANES];
+    unsigned lit = 0;
+    get_cosines(r, block, dir, cosines);
+    for (int i = 0; i < LANES; i++)
+        lit |= (unsigned)(cosines[i] > 0) << i;
+    return lit & lanes;
+}
+
+/** Do rays away from the light, from points of the box, surely miss the virtual objects? Then what
+ * their lines meet is on the light's side. */
+static bool is_before_virtual(const struct frame *frame, const struct box *box,
+                              const float dir[static 3])
+{
+    const float back[3] = {-dir[0], -dir[1], -dir[2]};
+    return !gn_box_may_meet_from_box(&frame->virtual_box, box, back);
+}
+
+/** Which lanes of a block does the virtual objects' silhouette hide; rays where it does not say. */
+static void cut_block(const struct frame *frame, struct scratch *scratch, int block, int light,
+                      const float dir[static 3], struct tile_figures *figures)
+{
+    const struct receivers *r = &scratch->receivers;
+    const struct silhouette *silhouette = &frame->virtual_silhouettes[light];
+    unsigned dark;
+    unsigned edge;
+    gn_silhouette_get_block(silhouette, r, block, &dark, &edge);
+    if ((dark | edge) == 0)
+        return;
+    unsigned lanes = get_lit_lanes(r, block, dir, dark | edge);
+    if ((lanes & dark) != 0 && is_before_virtual(frame, &r->boxes[block], dir)) {
+        scratch->cut[block][light] |= (uint16_t)(lanes & dark);
+        lanes &= ~dark;
+    }
+    trace_block(frame, scratch, block, light, dir, lanes, GN_RT_VIRTUAL, scratch->cut, figures);
 }
 
 /** Which lights do virtual objects hide? */
@@ -127,11 +164,16 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
     for (int l = 0; l < lights->n; l++) {
         float dir[3];
         get_light_dir(lights, l, dir);
-        if (frame->cull && !gn_box_may_meet_from_box(&frame->virtual_box, &r->box, dir))
+        const struct silhouette *s =
+            frame->virtual_silhouettes ? &frame->virtual_silhouettes[l] : NULL;
+        if (s && gn_silhouette_get_box(s, &r->box) == SILHOUETTE_FREE)
             continue;
         for (int b = 0; b < r->n_blocks; b++) {
-            if (!frame->cull || gn_box_may_meet_from_box(&frame->virtual_box, &r->boxes[b], dir))
-                trace_block(frame, scratch, b, l, dir, GN_RT_VIRTUAL, scratch->cut, figures);
+            if (!s)
+                trace_block(frame, scratch, b, l, dir, get_lit_lanes(r, b, dir, 0xffff),
+                            GN_RT_VIRTUAL, scratch->cut, figures);
+            else if (gn_silhouette_get_box(s, &r->boxes[b]) != SILHOUETTE_FREE)
+                cut_block(frame, scratch, b, l, dir, figures);
         }
     }
     flush(frame, scratch, GN_RT_VIRTUAL, scratch->cut, figures);
@@ -146,6 +188,38 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
     }
 }
 
+/** The flat ones of n boxes that rays from `from` may meet, into out. */
+static int list_flat(const struct frame *frame, const struct box *const *boxes, int n,
+                     const struct box *from, const float dir[static 3], const struct box **out)
+{
+    int n_out = 0;
+    for (int i = 0; i < n; i++) {
+        if (frame->clusters[0].is_flat[boxes[i] - frame->wide_blockers] &&
+            gn_box_may_meet_from_box(boxes[i], from, dir))
+            out[n_out++] = boxes[i];
+    }
+    return n_out;
+}
+
+/** Lanes of a block that real objects may hide from the light: those that a flat one's box or the
+ * others' silhouette does not rule out. */
+static unsigned get_doubtful_lanes(const struct frame *frame, const struct scratch *scratch,
+                                   int block, int light, const float dir[static 3],
+                                   const struct box *const *flat, int n_flat)
+{
+    const struct receivers *r = &scratch->receivers;
+    const struct silhouette *s = &frame->real_silhouettes[light];
+    unsigned dark = 0;
+    unsigned edge = 0;
+    for (int i = 0; i < n_flat; i++) {
+        if (gn_box_may_meet_from_box(flat[i], &r->boxes[block], dir))
+            return 0xffff;
+    }
+    if (gn_silhouette_get_box(s, &r->boxes[block]) != SILHOUETTE_FREE)
+        gn_silhouette_get_block(s, r, block, &dark, &edge);
+    return dark | edge;
+}
+
 /** Which lights do real objects hide from the wanted receivers? */
 static void find_hidden(const struct frame *frame, struct scratch *scratch,
                         struct tile_figures *figures)
@@ -153,22 +227,22 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
     const struct box *boxes[MAX_BLOCKERS];
-    int n_boxes = frame->cull ? gn_blockers_list_above(frame, r, boxes) : 0;
+    int n_boxes = frame->real_silhouettes ? gn_blockers_list_above(frame, r, boxes) : 0;
     for (int l = 0; l < lights->n; l++) {
-        const struct box *near[MAX_BLOCKERS];
-        int n_near = 0;
+        const struct silhouette *s = frame->real_silhouettes ? &frame->real_silhouettes[l] : NULL;
+        const struct box *flat[MAX_BLOCKERS];
         float dir[3];
         get_light_dir(lights, l, dir);
-        for (int i = 0; i < n_boxes; i++) {
-            if (gn_box_may_meet_from_box(boxes[i], &r->box, dir))
-                near[n_near++] = boxes[i];
-        }
-        for (int b = 0; b < r->n_blocks && (n_near > 0 || !frame->cull); b++) {
-            bool may_hide = !frame->cull;
-            for (int i = 0; i < n_near && !may_hide; i++)
-                may_hide = gn_box_may_meet_from_box(near[i], &r->boxes[b], dir);
-            if (may_hide && r->wanted[b])
-                trace_block(frame, scratch, b, l, dir, GN_RT_REAL, scratch->hidden, figures);
+        int n_flat = s ? list_flat(frame, boxes, n_boxes, &r->box, dir, flat) : 0;
+        if (s && n_flat == 0 && gn_silhouette_get_box(s, &r->box) == SILHOUETTE_FREE)
+            continue;
+        for (int b = 0; b < r->n_blocks; b++) {
+            unsigned lanes = r->wanted[b];
+            if (lanes != 0 && s)
+                lanes &= get_doubtful_lanes(frame, scratch, b, l, dir, flat, n_flat);
+            if (lanes != 0)
+                trace_block(frame, scratch, b, l, dir, get_lit_lanes(r, b, dir, lanes), GN_RT_REAL,
+                            scratch->hidden, figures);
         }
     }
     flush(frame, scratch, GN_RT_REAL, scratch->hidden, figures);
