@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #ifdef GN_HAVE_EMBREE4
 #include <embree4/rtcore.h>
@@ -363,20 +364,16 @@ static void trace_occluded16(const int *valid, RTCScene scene, struct RTCRay16 *
 }
 #endif
 
+/** The first two rows of Embree's ray are written as a whole each, since Embree reads them so: read
+ * soon after four single writes they wait for these, for longer than many a ray takes to trace. */
 static struct RTCRay make_ray(const float org[static 3], const float dir[static 3], float t_near,
                               float t_far)
 {
-    return (struct RTCRay){
-        .org_x = org[0],
-        .org_y = org[1],
-        .org_z = org[2],
-        .tnear = t_near,
-        .dir_x = dir[0],
-        .dir_y = dir[1],
-        .dir_z = dir[2],
-        .tfar = t_far,
-        .mask = 0xffffffffu,
-    };
+    typedef float row __attribute__((vector_size(16)));
+    const row rows[2] = {{org[0], org[1], org[2], t_near}, {dir[0], dir[1], dir[2], 0}};
+    struct RTCRay ray = {.tfar = t_far, .mask = 0xffffffffu};
+    memcpy(&ray, rows, sizeof(rows));
+    return ray;
 }
 
 /** Point, normal and clearance from the triangle's own vertices, in double, rounded once. */
