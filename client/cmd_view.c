@@ -69,6 +69,13 @@ static const struct gn_option option_table[] = {
      .help = "Frames that may be on their way at once. With 1 a frame waits for the result of the "
              "one before; with more, frames that the server has not begun are replaced by newer "
              "ones and come back as dropped."},
+    {.key = "match",
+     .flag = "match",
+     .type = GN_OPTION_SET,
+     .choices = GN_MATCH_NAMES,
+     .default_value = "all",
+     .help = "What of the camera the server is told, so that virtual pixels are given the same "
+             "(docs/frames.md)."},
     {.key = "sync-light",
      .flag = "sync-light",
      .type = GN_OPTION_INT,
@@ -335,6 +342,7 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
             list.entries[i].world_from_camera = v->camera.world_from_camera;
         }
     }
+    gn_match_keep(gn_options_get_set(options, NULL, NULL, "match"), &v->camera);
     gn_sequence_finish(&sequence);
     v->dir = gn_options_get_string(options, NULL, NULL, "out");
     set_frame_options(v, options);

@@ -115,8 +115,9 @@ int gn_camera_check(const struct gn_camera *camera, const char **out_reason)
     struct gn_pose pose = camera->world_from_camera;
     if (gn_pose_normalize(&pose) < 0)
         reason = "world_from_camera must be finite, its quaternion a unit one";
-    if (reason == NULL)
-        return gn_response_check(&camera->response, out_reason);
+    if (reason == NULL && gn_response_check(&camera->response, &reason) == 0 &&
+        gn_match_check(&camera->match, &reason) == 0)
+        return 0;
     if (out_reason != NULL)
         *out_reason = reason;
     return -EINVAL;

@@ -12,6 +12,7 @@
 #include <stdbool.h>
 
 #include "common/error.h"
+#include "common/match.h"
 #include "common/pose.h"
 #include "common/response.h"
 #include "proto/attr.h"
@@ -24,6 +25,7 @@ struct gn_camera {
     double cx, cy;               // px
     double distortion[5];        // k1, k2, p1, p2, k3 (OpenCV's order), 1
     struct gn_response response; // default sRGB, identity matrix, scale 1
+    struct gn_match match;       // default no noise, no blur
     struct gn_pose world_from_camera;
 };
 
@@ -46,7 +48,8 @@ bool gn_camera_project(const struct gn_camera *camera, const double point_camera
 
 /**
  * Reads camera.json (docs/frames.md): width, height, fx, fy, cx, cy, distortion[5],
- * world_from_camera[16 row-major], optional response, to_rec709, scale. On failure returns a
+ * world_from_camera[16 row-major], optional response, to_rec709, scale, noise,
+ * blur. On failure returns a
  * negative errno and one sentence in *out_error (may be NULL).
  */
 GN_MUST_USE int gn_camera_read_file(const char *path, struct gn_camera *out_camera,

@@ -6,166 +6,279 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
-/* Rows that one worker takes at a time. */
-#define ROWS 16
-/* A positive float's bits over this shift: its exponent and 6 bits of mantissa, steps of 1/64. */
-#define GUIDE_SHIFT 17
-#define GUIDE_SIZE (1 << (31 - GUIDE_SHIFT))
+#include "common/encoder.h"
+#include "common/noise.h"
+#include "common/point_spread.h"
 
-/*
- * Linear values to 8-bit codes without evaluating the curve: code k begins at edges[k], and a guide
- * says where to begin looking. The same codes as gn_response_encode and rounding, up to the float
- * spacing at an edge.
- */
-struct encoder {
-    float edges[257];          // [0] 0, [256] infinity
-    uint8_t guide[GUIDE_SIZE]; // the code of the smallest float of the bucket
+/* Rows that one worker takes at a time; more where each strip has neighbours to read besides. */
+#define ROWS 16
+#define SPREAD_ROWS 32
+/* Pixels that are worked on side by side, and their values. */
+#define BLOCK 16
+#define VALUES (3 * BLOCK)
+
+typedef float vec4 __attribute__((vector_size(16)));
+typedef int32_t mask4 __attribute__((vector_size(16)));
+
+static vec4 load(const float *at)
+{
+    vec4 v;
+    memcpy(&v, at, sizeof(v));
+    return v;
+}
+
+static void store(float *at, vec4 v)
+{
+    memcpy(at, &v, sizeof(v));
+}
+
+struct gn_compositor {
+    struct gn_pool *pool; // borrowed, may be NULL
+    int n_workers;
+    struct gn_spread *spreads; // [n_workers], owned
+    struct gn_noise noise;
+    struct gn_response curve; // that these are of; of type TABLE: of none
+    struct gn_encoder encoder;
+    float linear[256];
 };
 
 /* One picture's work, shared by all workers. */
 struct job {
+    const struct gn_compositor *compositor;
     const struct gn_composite_layers *layers;
-    int width, height;
+    int width, height, n_rows; // n_rows: of an item
+    struct gn_spread_kernel kernel;
     const struct gn_image8 *codes;
     const struct gn_response *response;
-    bool encoded_multiply;
-    float linear[256];              // the response's curve at every code
-    double radiance_from_device[9]; // row-major; the response's matrix and scale
+    bool encoded_multiply, has_noise, is_diagonal; // the latter: matrix and inverse
+    const float *linear;                           // [256], the response's curve at every code
+    double radiance_from_device[9];                // row-major; the response's matrix and scale
     double device_from_radiance[9];
-    struct encoder encoder;
+    float kept[9];   // row-major: what of a device channel is kept, from each radiance channel's f
+    float gains[12]; // where the matrix is diagonal: device from radiance, R, G, B again and again
+    float slope[3], offset[3];
+    uint32_t key; // of the noise
+    const struct gn_encoder *encoder;
     struct gn_image8 *out_codes;
     const struct gn_image *radiance;
     struct gn_image *out_radiance;
 };
 
-/* The layers at one pixel. */
-struct touch {
-    float shadow[3], added[3];
-    const float *rgba;
+/* Some pixels of a row, side by side: background * factor + light. */
+struct block {
+    float factor[VALUES]; // shadow * open
+    float light[VALUES];  // added * open + virtual; radiance
+    float open[BLOCK];    // 1 - A
+    float base[VALUES];   // background, device values
+    float rgb[VALUES];    // composite, device values
 };
 
-/* False where the pixel is left as it is. */
-static bool get_touch(const struct gn_composite_layers *layers, int x, int y, struct touch *out)
+/* True where all n values, which stand one after the other, are the value. */
+static bool are_all(const float *values, int n, float value)
 {
-    const float *shadow = layers->shadow ? gn_image_at(layers->shadow, x, y) : NULL;
-    const float *added = layers->added ? gn_image_at(layers->added, x, y) : NULL;
-    out->rgba = gn_image_at(layers->virtual_rgba, x, y);
-    bool is_touched = false;
-    for (int c = 0; c < 3; c++) {
-        out->shadow[c] = shadow ? shadow[c] : 1;
-        out->added[c] = added ? added[c] : 0;
-        is_touched = is_touched || out->shadow[c] != 1 || out->added[c] != 0 || out->rgba[c] != 0;
-    }
-    return is_touched || out->rgba[3] != 0;
+    mask4 is_other = {0};
+    for (int i = 0; i < n; i += 4)
+        is_other |= load(values + i) != value;
+    return (is_other[0] | is_other[1] | is_other[2] | is_other[3]) == 0;
 }
 
-/* rgb: shadowed background in, composite out. */
-static void blend(const struct touch *t, float rgb[static 3])
+/* Whether the whole block from x on keeps its bits, quickly. */
+static bool is_block_untouched(const struct gn_composite_layers *layers, int x, int y)
 {
-    for (int c = 0; c < 3; c++)
-        rgb[c] = (rgb[c] + t->added[c]) * (1 - t->rgba[3]) + t->rgba[c];
+    return are_all(gn_image_at(layers->virtual_rgba, x, y), 4 * BLOCK, 0) &&
+           (!layers->shadow || are_all(gn_image_at(layers->shadow, x, y), VALUES, 1)) &&
+           (!layers->added || are_all(gn_image_at(layers->added, x, y), VALUES, 0));
 }
 
-static uint32_t get_bits(float value)
+static void load_layers(const struct gn_composite_layers *layers, int x, int y, int n,
+                        struct block *out)
 {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof(bits));
-    return bits;
-}
-
-/* The linear value from which on the code is this one; infinity where none has it. */
-static float find_edge(const struct gn_response *response, int code)
-{
-    float edge = gn_response_decode(response, ((float)code - 0.5f) / 255);
-    const float least = (float)code - 0.501f; // 0.001: rounding in encode
-    /* Where a table is flat, encode gives the lowest code of the flat part; the others begin above.
-     */
-    if (gn_response_encode(response, edge) * 255 < least)
-        edge = nextafterf(edge, INFINITY);
-    return gn_response_encode(response, edge) * 255 < least ? INFINITY : edge;
-}
-
-static void init_encoder(const struct gn_response *response, struct encoder *out)
-{
-    out->edges[0] = 0;
-    for (int k = 1; k < 256; k++)
-        out->edges[k] = find_edge(response, k);
-    out->edges[256] = INFINITY;
-    int code = 0;
-    for (uint32_t i = 0; i < GUIDE_SIZE; i++) {
-        uint32_t bits = i << GUIDE_SHIFT;
-        float smallest;
-        memcpy(&smallest, &bits, sizeof(smallest));
-        while (code < 255 && smallest >= out->edges[code + 1]) // false for the NaNs at the end
-            code++;
-        out->guide[i] = (uint8_t)code;
+    for (int i = 0; i < n; i++) {
+        const float *shadow = layers->shadow ? gn_image_at(layers->shadow, x + i, y) : NULL;
+        const float *added = layers->added ? gn_image_at(layers->added, x + i, y) : NULL;
+        const float *rgba = gn_image_at(layers->virtual_rgba, x + i, y);
+        float open = out->open[i] = 1 - rgba[3];
+        for (int c = 0; c < 3; c++) {
+            out->factor[3 * i + c] = shadow ? shadow[c] * open : open;
+            out->light[3 * i + c] = added ? added[c] * open + rgba[c] : rgba[c];
+        }
     }
 }
 
-static uint8_t encode(const struct encoder *encoder, float linear)
+/* The same of a row that was spread. */
+static void load_spread(const struct gn_spread *spread, int x, int n, struct block *out)
 {
-    if (!(linear > 0)) // NaN too
-        return encoder->guide[0];
-    int code = encoder->guide[get_bits(linear) >> GUIDE_SHIFT];
-    while (code < 255 && linear >= encoder->edges[code + 1])
-        code++;
-    return (uint8_t)code;
+    for (int i = 0; i < n; i++) {
+        const float *rgba = spread->row[0] + 4 * (x + i);
+        const float *lost = spread->row[1] + 3 * (x + i), *gained = spread->row[2] + 3 * (x + i);
+        float open = out->open[i] = 1 - rgba[3];
+        for (int c = 0; c < 3; c++) {
+            float factor = open - lost[c];
+            out->factor[3 * i + c] = factor > 0 ? factor : 0; // the weights' rounding
+            out->light[3 * i + c] = gained[c] + rgba[c];
+        }
+    }
 }
 
-static void blend_codes8(const struct job *job, const struct touch *t, const uint8_t *in,
-                         uint8_t *out)
+/* True where the pixel keeps its bits. */
+static bool is_untouched(const struct block *b, int i)
 {
-    float rgb[3];
-    for (int c = 0; c < 3; c++)
-        rgb[c] = job->encoded_multiply
-                     ? gn_response_decode(job->response, (float)in[c] / 255 * t->shadow[c])
-                     : job->linear[in[c]];
-    gn_response_multiply(job->radiance_from_device, rgb);
-    if (!job->encoded_multiply)
+    const float *factor = b->factor + 3 * i, *light = b->light + 3 * i;
+    return b->open[i] == 1 && factor[0] == 1 && factor[1] == 1 && factor[2] == 1 && light[0] == 0 &&
+           light[1] == 0 && light[2] == 0;
+}
+
+/* rgb = base * factor + light in device values, where the matrix leaves the channels apart. */
+static void blend_diagonal(const struct job *job, struct block *b)
+{
+    for (int i = 0; i < VALUES; i += 4) {
+        vec4 v = load(b->base + i) * load(b->factor + i) +
+                 load(b->light + i) * load(job->gains + i % 12);
+        mask4 is_positive = v > 0;
+        store(b->rgb + i, (vec4)((mask4)v & is_positive)); // NaN to 0, too
+    }
+}
+
+/* The same through any matrix. */
+static void blend_mixed(const struct job *job, int n, struct block *b)
+{
+    for (int i = 0; i < 3 * n; i += 3) {
+        float *rgb = b->rgb + i;
+        memcpy(rgb, b->base + i, 3 * sizeof(*rgb));
+        gn_response_multiply(job->radiance_from_device, rgb);
         for (int c = 0; c < 3; c++)
-            rgb[c] *= t->shadow[c];
-    blend(t, rgb);
-    gn_response_multiply(job->device_from_radiance, rgb);
-    for (int c = 0; c < 3; c++)
-        out[c] = encode(&job->encoder, rgb[c]);
+            rgb[c] = rgb[c] * b->factor[i + c] + b->light[i + c];
+        gn_response_multiply(job->device_from_radiance, rgb);
+    }
 }
 
-static void composite_codes8_rows(void *context, int item, int worker)
+/* The same with the paper's literal reading: the shadow multiplies the codes. */
+static void blend_codes(const struct job *job, const uint8_t *codes, int n, struct block *b)
 {
-    (void)worker;
-    const struct job *job = context;
-    for (int y = item * ROWS; y < (item + 1) * ROWS && y < job->height; y++) {
-        for (int x = 0; x < job->width; x++) {
-            const uint8_t *in = gn_image8_at(job->codes, x, y);
-            uint8_t *out = gn_image8_at(job->out_codes, x, y);
-            struct touch t;
-            if (get_touch(job->layers, x, y, &t)) {
-                blend_codes8(job, &t, in, out);
-                continue;
-            }
-            for (int c = 0; c < 3; c++)
-                out[c] = in[c];
+    for (int i = 0; i < n; i++) {
+        float *rgb = b->rgb + 3 * i, open = b->open[i];
+        for (int c = 0; c < 3; c++) {
+            float shadow = open > 1e-6f ? b->factor[3 * i + c] / open : 1;
+            rgb[c] = gn_response_decode(job->response, (float)codes[3 * i + c] / 255 * shadow);
+        }
+        gn_response_multiply(job->radiance_from_device, rgb);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = rgb[c] * open + b->light[3 * i + c];
+        gn_response_multiply(job->device_from_radiance, rgb);
+    }
+}
+
+static void add_noise(const struct job *job, int x, int y, int n, struct block *b)
+{
+    for (int i = 0; i < n; i++) {
+        float deviates[3], *rgb = b->rgb + 3 * i;
+        const float *factor = b->factor + 3 * i;
+        gn_noise_get(&job->compositor->noise, job->key, (uint32_t)(x + i), (uint32_t)y, deviates);
+        for (int c = 0; c < 3; c++) {
+            const float *kept = job->kept + 3 * c;
+            float f = kept[0] * factor[0] + kept[1] * factor[1] + kept[2] * factor[2];
+            float missing = job->slope[c] * rgb[c] + job->offset[c] -
+                            f * f * (job->slope[c] * b->base[3 * i + c] + job->offset[c]);
+            rgb[c] += deviates[c] * sqrtf(missing > 0 ? missing : 0);
         }
     }
 }
 
-static void composite_linear_rows(void *context, int item, int worker)
+static void put_codes8(const struct job *job, int x, int y, int n, struct block *b)
 {
-    (void)worker;
+    const uint8_t *in = gn_image8_at(job->codes, x, y);
+    uint8_t *out = gn_image8_at(job->out_codes, x, y);
+    for (int i = 0; i < 3 * n; i++)
+        b->base[i] = job->linear[in[i]];
+    if (job->encoded_multiply)
+        blend_codes(job, in, n, b);
+    else if (job->is_diagonal)
+        blend_diagonal(job, b);
+    else
+        blend_mixed(job, n, b);
+    if (job->has_noise)
+        add_noise(job, x, y, n, b);
+    for (int i = 0; i < n; i++) {
+        if (is_untouched(b, i))
+            continue;
+        for (int c = 3 * i; c < 3 * i + 3; c++)
+            out[c] = gn_encoder_get(job->encoder, b->rgb[c]);
+    }
+}
+
+static void put_linear(const struct job *job, int x, int y, int n, struct block *b)
+{
+    const float *in = gn_image_at(job->radiance, x, y);
+    float *out = gn_image_at(job->out_radiance, x, y);
+    memcpy(b->base, in, 3 * (size_t)n * sizeof(*in));
+    for (int i = 0; i < 3 * n; i++)
+        b->rgb[i] = in[i] * b->factor[i] + b->light[i];
+    for (int i = 0; job->has_noise && i < n; i++) {
+        gn_response_multiply(job->device_from_radiance, b->base + 3 * i);
+        gn_response_multiply(job->device_from_radiance, b->rgb + 3 * i);
+    }
+    if (job->has_noise)
+        add_noise(job, x, y, n, b);
+    for (int i = 0; i < n; i++) {
+        if (is_untouched(b, i))
+            continue;
+        if (job->has_noise)
+            gn_response_multiply(job->radiance_from_device, b->rgb + 3 * i);
+        memcpy(out + 3 * i, b->rgb + 3 * i, 3 * sizeof(*out));
+    }
+}
+
+/* A row's pixels [begin, end). spread: its row is there, NULL: the layers as they are. */
+static void composite_span(const struct job *job, const struct gn_spread *spread, int y, int begin,
+                           int end)
+{
+    struct block b = {0};
+    for (int x = begin; x < end; x += BLOCK) {
+        int n = x + BLOCK <= end ? BLOCK : end - x;
+        if (spread)
+            load_spread(spread, x, n, &b);
+        else if (n == BLOCK && is_block_untouched(job->layers, x, y))
+            continue;
+        else
+            load_layers(job->layers, x, y, n, &b);
+        if (job->codes)
+            put_codes8(job, x, y, n, &b);
+        else
+            put_linear(job, x, y, n, &b);
+    }
+}
+
+/* The picture as it is, to be touched where layers are. */
+static void copy_rows(const struct job *job, int y, int n)
+{
+    size_t values = 3 * (size_t)job->width * (size_t)n;
+    if (job->codes && job->codes->data != job->out_codes->data)
+        memcpy(gn_image8_at(job->out_codes, 0, y), gn_image8_at(job->codes, 0, y), values);
+    if (job->radiance && job->radiance->data != job->out_radiance->data)
+        memcpy(gn_image_at(job->out_radiance, 0, y), gn_image_at(job->radiance, 0, y),
+               values * sizeof(float));
+}
+
+static void composite_rows(void *context, int item, int worker)
+{
     const struct job *job = context;
-    for (int y = item * ROWS; y < (item + 1) * ROWS && y < job->height; y++) {
-        for (int x = 0; x < job->width; x++) {
-            const float *in = gn_image_at(job->radiance, x, y);
-            float *out = gn_image_at(job->out_radiance, x, y);
-            struct touch t;
-            bool is_touched = get_touch(job->layers, x, y, &t);
-            for (int c = 0; c < 3; c++)
-                out[c] = is_touched ? in[c] * t.shadow[c] : in[c];
-            if (is_touched)
-                blend(&t, out);
-        }
+    const struct gn_composite_layers *layers = job->layers;
+    struct gn_spread *spread = NULL;
+    int y = item * job->n_rows, begin = 0, end = job->width;
+    int n = y + job->n_rows < job->height ? job->n_rows : job->height - y;
+    copy_rows(job, y, n);
+    if (job->kernel.radius > 0) {
+        spread = &job->compositor->spreads[worker];
+        gn_spread_load(spread, &job->kernel, layers->virtual_rgba, layers->shadow, layers->added, y,
+                       n);
+    }
+    for (int i = 0; i < n; i++) {
+        if (spread)
+            gn_spread_get_row(spread, &job->kernel, i, &begin, &end);
+        composite_span(job, spread, y + i, begin, end);
     }
 }
 
@@ -182,42 +295,132 @@ static bool are_layers_ok(const struct gn_composite_layers *layers, int width, i
            (!layers->added || has_shape(layers->added, width, height, 3));
 }
 
-int gn_composite_image8(const struct gn_composite_layers *layers,
-                        const struct gn_image8 *background, const struct gn_response *response,
-                        bool encoded_multiply, struct gn_pool *pool, struct gn_image8 *out)
+/* Encoder and codes of the response's curve; as they are where it is the last picture's. */
+static void keep_curve(struct gn_compositor *c, const struct gn_response *response)
+{
+    const struct gn_response *old = &c->curve;
+    if (response->type != GN_RESPONSE_TABLE && response->type == old->type &&
+        response->gamma == old->gamma && response->log_a == old->log_a &&
+        response->log_b == old->log_b && response->log_c == old->log_c)
+        return;
+    gn_encoder_init(response, &c->encoder);
+    for (int i = 0; i < 256; i++)
+        c->linear[i] = gn_response_decode(response, (float)i / 255);
+    c->curve = *response; // its table is borrowed no longer, and not read
+}
+
+static void init_noise(struct job *job, const struct gn_composite_options *options)
+{
+    job->has_noise = gn_match_has_noise(&options->match);
+    job->key = gn_noise_get_key(options->frame);
+    for (int i = 0; i < 3; i++) {
+        job->slope[i] = (float)options->match.noise_slope[i];
+        job->offset[i] = (float)options->match.noise_offset[i];
+        for (int k = 0; k < 3; k++)
+            job->kept[3 * i + k] = (float)(job->device_from_radiance[3 * i + k] *
+                                           job->radiance_from_device[3 * k + i]);
+    }
+}
+
+/* Runs a job whose pictures are set. */
+static int run(struct gn_compositor *compositor, const struct gn_composite_options *options,
+               struct job *job)
+{
+    if (!are_layers_ok(job->layers, job->width, job->height) ||
+        gn_response_check(job->response, NULL) || gn_match_check(&options->match, NULL))
+        return -EINVAL;
+    job->compositor = compositor;
+    job->n_rows = ROWS;
+    gn_response_get_matrices(job->response, job->radiance_from_device, job->device_from_radiance);
+    const double *m = job->device_from_radiance;
+    job->is_diagonal = m[1] == 0 && m[2] == 0 && m[3] == 0 && m[5] == 0 && m[6] == 0 && m[7] == 0;
+    for (int i = 0; i < 12; i++)
+        job->gains[i] = (float)m[4 * (i % 3)];
+    init_noise(job, options);
+    if (options->match.blur_px > 0)
+        gn_spread_make_kernel(options->match.blur_px, &job->kernel);
+    if (job->kernel.radius > 0) {
+        job->n_rows = SPREAD_ROWS;
+        for (int i = 0; i < compositor->n_workers; i++) {
+            int ret = gn_spread_reserve(&compositor->spreads[i], job->width, job->n_rows,
+                                        job->kernel.radius);
+            if (ret < 0)
+                return ret;
+        }
+    }
+    if (job->codes) {
+        keep_curve(compositor, job->response);
+        job->encoder = &compositor->encoder;
+        job->linear = compositor->linear;
+    }
+    gn_pool_run(compositor->pool, (job->height + job->n_rows - 1) / job->n_rows, composite_rows,
+                job);
+    return 0;
+}
+
+int gn_compositor_create(struct gn_pool *pool, struct gn_compositor **out_compositor)
+{
+    struct gn_compositor *c = calloc(1, sizeof(*c));
+    *out_compositor = NULL;
+    if (!c)
+        return -ENOMEM;
+    c->pool = pool;
+    c->n_workers = gn_pool_get_size(pool);
+    c->spreads = calloc((size_t)c->n_workers, sizeof(*c->spreads));
+    if (!c->spreads) {
+        gn_compositor_destroy(&c);
+        return -ENOMEM;
+    }
+    gn_noise_init(&c->noise);
+    c->curve.type = GN_RESPONSE_TABLE;
+    *out_compositor = c;
+    return 0;
+}
+
+void gn_compositor_destroy(struct gn_compositor **compositor)
+{
+    struct gn_compositor *c = *compositor;
+    if (!c)
+        return;
+    for (int i = 0; c->spreads && i < c->n_workers; i++)
+        gn_spread_finish(&c->spreads[i]);
+    free(c->spreads);
+    free(c);
+    *compositor = NULL;
+}
+
+int gn_compositor_put_image8(struct gn_compositor *compositor,
+                             const struct gn_composite_layers *layers,
+                             const struct gn_image8 *background, const struct gn_response *response,
+                             const struct gn_composite_options *options, struct gn_image8 *out)
 {
     int width = background->width, height = background->height;
     if (!background->data || background->channels != 3 || !out->data || out->channels != 3 ||
-        out->width != width || out->height != height || !are_layers_ok(layers, width, height) ||
-        gn_response_check(response, NULL))
+        out->width != width || out->height != height)
         return -EINVAL;
     struct job job = {.layers = layers,
                       .width = width,
                       .height = height,
                       .codes = background,
                       .response = response,
-                      .encoded_multiply = encoded_multiply,
+                      .encoded_multiply = options->encoded_multiply,
                       .out_codes = out};
-    gn_response_get_matrices(response, job.radiance_from_device, job.device_from_radiance);
-    init_encoder(response, &job.encoder);
-    for (int i = 0; i < 256; i++)
-        job.linear[i] = gn_response_decode(response, (float)i / 255);
-    gn_pool_run(pool, (height + ROWS - 1) / ROWS, composite_codes8_rows, &job);
-    return 0;
+    return run(compositor, options, &job);
 }
 
-int gn_composite_linear(const struct gn_composite_layers *layers, const struct gn_image *background,
-                        struct gn_pool *pool, struct gn_image *out)
+int gn_compositor_put_linear(struct gn_compositor *compositor,
+                             const struct gn_composite_layers *layers,
+                             const struct gn_image *background, const struct gn_response *response,
+                             const struct gn_composite_options *options, struct gn_image *out)
 {
     int width = background->width, height = background->height;
-    if (!has_shape(background, width, height, 3) || !has_shape(out, width, height, 3) ||
-        !are_layers_ok(layers, width, height))
+    if (!has_shape(background, width, height, 3) || !has_shape(out, width, height, 3))
         return -EINVAL;
     struct job job = {.layers = layers,
                       .width = width,
                       .height = height,
+                      .response = response,
                       .radiance = background,
                       .out_radiance = out};
-    gn_pool_run(pool, (height + ROWS - 1) / ROWS, composite_linear_rows, &job);
-    return 0;
+    return run(compositor, options, &job);
 }

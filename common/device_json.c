@@ -86,12 +86,46 @@ int gn_pose_read_json(const struct gn_json *object, const char *key, struct gn_p
     return ret;
 }
 
+/* noise {slope [3], offset [3]} and blur. */
+static int read_match(const struct gn_json *object, struct gn_match *out,
+                      struct gn_error *out_error)
+{
+    static const char *const keys[] = {"slope", "offset"};
+    struct gn_json noise;
+    int ret = 0;
+    if (gn_json_has(object, "noise")) {
+        ret = gn_json_get_object(object, "noise", &noise, out_error);
+        if (ret == 0)
+            ret = gn_json_check_keys(&noise, keys, GN_ARRAY_LEN(keys), out_error);
+        if (ret == 0 && gn_json_has(&noise, "slope"))
+            ret = gn_json_get_numbers(&noise, "slope", 3, out->noise_slope, out_error);
+        if (ret == 0 && gn_json_has(&noise, "offset"))
+            ret = gn_json_get_numbers(&noise, "offset", 3, out->noise_offset, out_error);
+        const char *reason = NULL;
+        if (ret == 0 && gn_match_check(out, &reason) < 0)
+            ret = gn_json_refuse(object, "noise", out_error, "%s", reason);
+    }
+    if (ret == 0 && gn_json_has(object, "blur"))
+        ret = gn_json_get_double(object, "blur", 0, GN_MATCH_MAX_BLUR_PX, &out->blur_px, out_error);
+    return ret;
+}
+
 int gn_camera_read_json(const struct gn_json *object, bool needs_pose, struct gn_camera *out_camera,
                         struct gn_error *out_error)
 {
-    static const char *const keys[] = {
-        "width",      "height",           "fx", "fy", "cx", "cy", "response", "to_rec709", "scale",
-        "distortion", "world_from_camera"};
+    static const char *const keys[] = {"width",
+                                       "height",
+                                       "fx",
+                                       "fy",
+                                       "cx",
+                                       "cy",
+                                       "response",
+                                       "to_rec709",
+                                       "scale",
+                                       "noise",
+                                       "blur",
+                                       "distortion",
+                                       "world_from_camera"};
     struct gn_camera camera = {.response = {.type = GN_RESPONSE_SRGB},
                                .world_from_camera = {.rotation = {1.0}}};
     int ret =
@@ -102,6 +136,8 @@ int gn_camera_read_json(const struct gn_json *object, bool needs_pose, struct gn
         ret = gn_pose_read_json(object, "world_from_camera", &camera.world_from_camera, out_error);
     if (ret == 0)
         ret = gn_response_read_json(object, &camera.response, out_error);
+    if (ret == 0)
+        ret = read_match(object, &camera.match, out_error);
     const char *reason = NULL;
     if (ret == 0 && gn_camera_check(&camera, &reason) < 0)
         ret = gn_json_refuse(object, NULL, out_error, "%s", reason);

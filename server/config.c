@@ -70,6 +70,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
         .emitters = {.n_pieces = gn_options_get_int(o, "room", room, "emitter-pieces")},
         .environment_noise = gn_options_get_double(o, "room", room, "environment-noise"),
         .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
+        .unmatched = GN_MATCH_ALL & ~gn_options_get_set(o, "room", room, "match"),
         .refuse_reference = !gn_options_get_bool(o, "room", room, "allow-reference"),
         .max_picture_width = gn_options_get_int(o, "room", room, "max-picture-width"),
         .max_picture_height = gn_options_get_int(o, "room", room, "max-picture-height"),

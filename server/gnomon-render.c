@@ -32,6 +32,7 @@ static int read_inputs(const struct gn_cli_request *request, struct run *run,
                        struct gn_error *out_error)
 {
     int ret = gn_camera_read_file(request->camera, &run->camera, out_error);
+    gn_match_keep(request->match, &run->camera);
     if (ret == 0 && request->background)
         ret =
             gn_cli_background_read(request->background, &run->camera, &run->background, out_error);
@@ -86,6 +87,7 @@ static int run_request(const struct gn_cli_request *request, struct gn_error *ou
         .background = request->background ? &run.background : NULL,
         .report = &run.report,
         .n_threads = gn_pool_get_size(run.pool),
+        .seed = request->render.seed,
         .ms_scene = run.ms_scene,
         .ms_light = run.ms_light,
         .ms_total = get_ms_since(start_ns),

@@ -38,6 +38,7 @@ struct gn_cli_request {
     int n_emitter_pieces; // 0: the default
     const char *emission; // NAME=FILE; may be NULL
     int n_threads;        // 0: one per processor
+    unsigned match;       // of enum gn_match_part
 };
 
 /**
@@ -88,6 +89,7 @@ struct gn_cli_result {
     const struct gn_render_report *report;
     const struct gn_render_needs *needs;
     int n_threads;
+    uint64_t seed; // of the composite's noise
     double ms_scene, ms_light, ms_total;
 };
 

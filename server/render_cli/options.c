@@ -44,7 +44,13 @@ static const struct gn_option table[] = {
     {.key = "camera",
      .value_name = "FILE",
      .is_required = true,
-     .help = "camera.json: size, intrinsics, distortion, pose."},
+     .help = "camera.json: size, intrinsics, distortion, pose, response, noise, blur."},
+    {.key = "match",
+     .type = GN_OPTION_SET,
+     .choices = GN_MATCH_NAMES,
+     .default_value = "all",
+     .help = "What of the camera virtual pixels are given; the rest counts as not said in "
+             "camera.json. Noise and blur are in the composites, not in the layers."},
     {.key = "background",
      .value_name = "FILE",
      .help = "The camera's picture: codes of the camera's response (PNG, JPEG), or linear (EXR). "
@@ -177,7 +183,7 @@ static const struct gn_option table[] = {
      .max = 2147483647,
      .default_value = "0",
      .value_name = "N",
-     .help = "Seed of these paths."},
+     .help = "Seed of these paths, and of the composites' noise."},
     {.key = "budget-ms",
      .type = GN_OPTION_DOUBLE,
      .min = 0.001,
@@ -355,6 +361,7 @@ static void read_numbers(struct gn_cli_request *request)
     if (request->has_projection)
         request->projection = (enum gn_projection_type)get_enum(request, "env-projection");
     request->n_threads = get_int(request, "threads");
+    request->match = gn_options_get_set(request->options, NULL, NULL, "match");
 }
 
 static int check_together(const struct gn_cli_request *request, struct gn_error *out_error)

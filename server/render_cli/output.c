@@ -137,16 +137,18 @@ static struct gn_composite_layers get_composite_layers(const struct gn_layers *l
  * scales the codes, as the 2007 paper has it. */
 static int write_composite_png(const char *path, bool is_literal,
                                const struct gn_cli_result *result, const struct gn_image *composite,
-                               struct gn_pool *pool, struct gn_error *out_error)
+                               struct gn_compositor *compositor, struct gn_error *out_error)
 {
     const struct gn_image8 *codes = &result->background->codes8;
     const struct gn_response *response = &result->camera->response;
     if (codes->data) {
         struct gn_composite_layers layers = get_composite_layers(result->layers);
+        const struct gn_composite_options options = {
+            .encoded_multiply = is_literal, .match = result->camera->match, .frame = result->seed};
         struct gn_image8 out = {0};
         int ret = gn_image8_init(&out, codes->width, codes->height, 3);
         if (ret == 0)
-            ret = gn_composite_image8(&layers, codes, response, is_literal, pool, &out);
+            ret = gn_compositor_put_image8(compositor, &layers, codes, response, &options, &out);
         if (ret < 0)
             (void)gn_error_set(out_error, ret, "%s: cannot composite", path);
         else
@@ -195,19 +197,22 @@ static int write_irradiance_map(const char *path, const struct gn_lighting_state
     return ret;
 }
 
-static int make_composite(const struct gn_cli_result *result, struct gn_pool *pool,
+static int make_composite(const struct gn_cli_result *result, struct gn_compositor *compositor,
                           struct gn_image *out, struct gn_error *out_error)
 {
     struct gn_composite_layers layers = get_composite_layers(result->layers);
+    const struct gn_composite_options options = {.match = result->camera->match,
+                                                 .frame = result->seed};
     int ret = gn_image_init(out, result->layers->width, result->layers->height, 3);
     if (ret == 0)
-        ret = gn_composite_linear(&layers, &result->background->linear, pool, out);
+        ret = gn_compositor_put_linear(compositor, &layers, &result->background->linear,
+                                       &result->camera->response, &options, out);
     return ret < 0 ? gn_error_set(out_error, ret, "cannot composite") : 0;
 }
 
 static int write_all(const struct gn_cli_request *request, const struct gn_cli_result *result,
-                     const struct gn_image *composite, struct gn_pool *pool, int *n_written,
-                     struct gn_error *out_error)
+                     const struct gn_image *composite, struct gn_compositor *compositor,
+                     struct gn_pool *pool, int *n_written, struct gn_error *out_error)
 {
     const struct gn_layers *layers = result->layers;
     int ret = 0;
@@ -231,7 +236,7 @@ static int write_all(const struct gn_cli_request *request, const struct gn_cli_r
     if (ret == 0 && request->composite_png) {
         ret =
             write_composite_png(request->composite_png, request->render.quality == GN_QUALITY_SEED,
-                                result, composite, pool, out_error);
+                                result, composite, compositor, out_error);
         *n_written += ret == 0;
     }
     if (ret == 0)
@@ -243,13 +248,16 @@ int gn_cli_write_outputs(const struct gn_cli_request *request, const struct gn_c
                          struct gn_pool *pool, struct gn_error *out_error)
 {
     struct gn_image composite = {0};
+    struct gn_compositor *compositor = NULL;
     int n_written = 0;
-    int ret = 0;
+    int ret = gn_compositor_create(pool, &compositor);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "out of memory");
     if (result->background)
-        ret = make_composite(result, pool, &composite, out_error);
+        ret = make_composite(result, compositor, &composite, out_error);
     if (ret == 0)
-        ret = write_all(request, result, result->background ? &composite : NULL, pool, &n_written,
-                        out_error);
+        ret = write_all(request, result, result->background ? &composite : NULL, compositor, pool,
+                        &n_written, out_error);
     if (ret < 0) {
         const char *outputs[MAX_OUTPUTS];
         (void)list_outputs(request, outputs);
@@ -257,5 +265,6 @@ int gn_cli_write_outputs(const struct gn_cli_request *request, const struct gn_c
             (void)unlink(outputs[i]);
     }
     gn_image_finish(&composite);
+    gn_compositor_destroy(&compositor);
     return ret;
 }

@@ -24,6 +24,7 @@ struct frame_buffers {
 struct gn_frame_maker {
     const struct gn_room_options *options;
     struct gn_renderer *renderer;
+    struct gn_compositor *compositor;
     struct gn_jpeg *jpeg;
     struct gn_buf_pool *payloads;
     uint64_t n_frames;
@@ -49,7 +50,9 @@ int gn_frame_maker_create(const struct gn_room_options *options, const struct gn
     int rc = gn_renderer_create(scene, options->pool, &m->renderer, out_error);
     if (rc < 0)
         goto out;
-    rc = gn_jpeg_create(&m->jpeg);
+    rc = gn_compositor_create(options->pool, &m->compositor);
+    if (rc == 0)
+        rc = gn_jpeg_create(&m->jpeg);
     if (rc == 0)
         rc = gn_buf_pool_create(&m->payloads);
     if (rc < 0) {
@@ -72,6 +75,7 @@ void gn_frame_maker_destroy(struct gn_frame_maker **maker)
         finish_buffers(&m->buffers[i]);
     gn_buf_pool_destroy(&m->payloads);
     gn_jpeg_destroy(&m->jpeg);
+    gn_compositor_destroy(&m->compositor);
     gn_renderer_destroy(&m->renderer);
     free(m);
     *maker = NULL;
@@ -203,11 +207,17 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     add_report(&w->result->receipt, &report);
     const struct gn_composite_layers layers = {&b->layers.virtual_rgba, &b->layers.shadow,
                                                &b->layers.added};
-    bool is_literal = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED;
+    const struct gn_composite_options look = {
+        .encoded_multiply = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED,
+        .match = camera->match,
+        .frame = w->job->frame.id * GN_LIMIT_VIEWS + index,
+    };
     int64_t at = gn_clock_get_monotonic_ns();
-    rc = gn_composite_image8(&layers, &b->background, &camera->response, is_literal,
-                             m->options->pool, &b->composite);
+    rc = gn_compositor_put_image8(m->compositor, &layers, &b->background, &camera->response, &look,
+                                  &b->composite);
     w->result->receipt.composite_ms += (float)lap(&at);
+    if (rc == -ENOMEM)
+        return gn_error_set(error, rc, "out of memory for the composite");
     return rc < 0 ? gn_error_set(error, rc, "the layers do not fit the picture") : 0;
 }
 

@@ -32,10 +32,11 @@ struct gn_room_options {
     struct gn_emitter_options emitters; // all-zero: defaults
     double environment_noise; // share by which radiance may differ in a frame that counts as the
                               // same, [0, 0.1]; 0: frames that are the same to the byte
-    struct gn_render_options render;           // quality and seed are each frame's own
-    bool encoded_multiply;                     // the paper's composite: the factor scales codes
-    bool refuse_reference;                     // frames of reference quality are dropped
-    int max_picture_width, max_picture_height; // px, [1, GN_LIMIT_SIDE_PX]
+    struct gn_render_options render; // quality and seed are each frame's own
+    bool encoded_multiply;           // the paper's composite: the factor scales codes
+    unsigned unmatched;              // of enum gn_match_part: what of the cameras is not matched
+    bool refuse_reference;           // frames of reference quality are dropped
+    int max_picture_width, max_picture_height;         // px, [1, GN_LIMIT_SIDE_PX]
     int max_environment_width, max_environment_height; // px, [1, GN_LIMIT_SIDE_PX]
     double holdable_margin;     // share of the measured rate that is promised, (0, 1]
     struct gn_pool *pool;       // borrowed until destroy; may be NULL

@@ -16,7 +16,7 @@ OPTIONS = [
     ([GNOMON, 'probe'], CONNECT | REPLAY | {'setup', 'projection', 'first-sequence'}),
     ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
     ([GNOMON, 'view'], CONNECT | REPLAY | {'camera', 'out', 'result', 'jpeg-quality', 'quality',
-                                           'outstanding', 'sync-light'}),
+                                           'outstanding', 'match', 'sync-light'}),
     ([GNOMON, 'doctor'], CONNECT),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
     ([RENDER], {'scene', 'env', 'env-projection', 'env-params', 'world-from-env', 'camera',

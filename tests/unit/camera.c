@@ -165,6 +165,9 @@ static void test_check(void **unused)
                                &camera.cx,
                                &camera.cy,
                                &camera.distortion[4],
+                               &camera.match.noise_slope[0],
+                               &camera.match.noise_offset[2],
+                               &camera.match.blur_px,
                                &camera.world_from_camera.rotation[2],
                                &camera.world_from_camera.translation[1]};
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++) {
@@ -239,6 +242,13 @@ static void test_read(void **unused)
     assert_int_equal(read_text("{" SIZES LENS POSE ",\"response\":{\"type\":\"linear\"}}", &c, &e),
                      0);
     assert_int_equal(c.response.type, GN_RESPONSE_LINEAR);
+    assert_true(!gn_match_has_noise(&c.match) && c.match.blur_px == 0);
+    assert_int_equal(read_text("{" SIZES LENS POSE ",\"noise\":{\"slope\":[1e-3,2e-3,1],"
+                               "\"offset\":[0,1e-5,1e-6]},\"blur\":0.75}",
+                               &c, &e),
+                     0);
+    assert_true(c.match.noise_slope[1] == 2e-3 && c.match.noise_offset[2] == 1e-6);
+    assert_true(c.match.blur_px == 0.75);
 }
 
 static void test_read_errors(void **unused)
@@ -279,6 +289,16 @@ static void test_read_errors(void **unused)
          ": scale: expected a number in [1e-12, 1e+12], found 0"},
         {"{" SIZES LENS POSE ",\"to_rec709\":[1,0,0,0,1,0,0,0]}",
          ": to_rec709: expected 9 elements, found 8"},
+        {"{" SIZES LENS POSE ",\"noise\":0.1}", ": noise: expected an object, found a number"},
+        {"{" SIZES LENS POSE ",\"noise\":{\"sigma\":[1,1,1]}}",
+         ": noise: unknown key 'sigma'; known are slope, offset"},
+        {"{" SIZES LENS POSE ",\"noise\":{\"slope\":[0,0]}}",
+         ": noise.slope: expected 3 elements, found 2"},
+        {"{" SIZES LENS POSE ",\"noise\":{\"slope\":[0,-1e-9,0]}}",
+         ": noise: slope and offset of a camera's noise must lie in [0, 1]"},
+        {"{" SIZES LENS POSE ",\"noise\":{\"offset\":[0,0,1e300]}}",
+         ": noise: slope and offset of a camera's noise must lie in [0, 1]"},
+        {"{" SIZES LENS POSE ",\"blur\":8.1}", ": blur: expected a number in [0, 8], found 8.1"},
     };
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct gn_camera c = {.width = 12345};

@@ -20,6 +20,9 @@ struct fixture {
     struct gn_image rgba, shadow, added;
     struct gn_image8 background, out;
     struct gn_composite_layers layers;
+    struct gn_composite_options options;
+    struct gn_pool *pool;
+    struct gn_compositor *compositor;
 };
 
 static int set_up(void **state)
@@ -35,6 +38,9 @@ static int set_up(void **state)
         f.background.data[i] = (uint8_t)i;
     }
     f.layers = (struct gn_composite_layers){&f.rgba, &f.shadow, &f.added};
+    f.options = (struct gn_composite_options){0};
+    assert_int_equal(gn_pool_create(3, &f.pool), 0);
+    assert_int_equal(gn_compositor_create(f.pool, &f.compositor), 0);
     *state = &f;
     return 0;
 }
@@ -47,7 +53,16 @@ static int tear_down(void **state)
     gn_image_finish(&f->added);
     gn_image8_finish(&f->background);
     gn_image8_finish(&f->out);
+    gn_compositor_destroy(&f->compositor);
+    gn_pool_destroy(&f->pool);
     return 0;
+}
+
+/* The fixture's background to its out. */
+static int put(struct fixture *f, const struct gn_response *response)
+{
+    return gn_compositor_put_image8(f->compositor, &f->layers, &f->background, response,
+                                    &f->options, &f->out);
 }
 
 /* A response that would not give all codes back leaves them alone where no layer touches them. */
@@ -61,11 +76,12 @@ static void test_untouched(void **state)
                             .to_rec709 = {2, -1, 0, 0, 1, 0, 0, 0, 1}};
     for (int e = 0; e < 2; e++) {
         memset(f->out.data, 9, WIDTH * HEIGHT * 3);
-        assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, e, NULL, &f->out), 0);
+        f->options.encoded_multiply = e;
+        assert_int_equal(put(f, &r), 0);
         assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
     }
     f->layers.shadow = f->layers.added = NULL;
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out), 0);
+    assert_int_equal(put(f, &r), 0);
     assert_memory_equal(f->out.data, f->background.data, WIDTH * HEIGHT * 3);
 }
 
@@ -78,14 +94,30 @@ static void test_shadow_on_srgb(void **state)
         f->background.data[i] = 188;
         f->shadow.data[i] = 0.5f;
     }
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &srgb, false, NULL, &f->out),
-                     0);
+    assert_int_equal(put(f, &srgb), 0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
         assert_int_equal(f->out.data[i], 137);
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &srgb, true, NULL, &f->out),
-                     0);
+    f->options.encoded_multiply = true;
+    assert_int_equal(put(f, &srgb), 0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
         assert_int_equal(f->out.data[i], 94);
+}
+
+/* An edge's pixel that white covers by half mixes light, not codes: over black it is 188; over
+ * code 124, linear 0.2016, it is linear 0.6008, 204. */
+static void test_half_covered(void **state)
+{
+    struct fixture *f = *state;
+    const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        for (int c = 0; c < 3; c++)
+            f->background.data[3 * i + c] = i % 2 ? 124 : 0;
+        for (int c = 0; c < 4; c++) // premultiplied
+            f->rgba.data[4 * i + c] = 0.5f;
+    }
+    assert_int_equal(put(f, &srgb), 0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
+        assert_int_equal(f->out.data[i], i / 3 % 2 ? 204 : 188);
 }
 
 /* All terms at once, each channel its own, against the formula; in place; on a pool too. */
@@ -104,27 +136,29 @@ static void test_formula(void **state)
             f->added.data[3 * i + c] = (float)((i + 2 * c) % 6) / 2;
         }
     }
-    assert_int_equal(gn_composite_linear(&f->layers, &radiance, NULL, &out), 0);
+    const struct gn_response linear = {.scale = 255.0 / 16};
+    struct gn_compositor *alone;
+    assert_int_equal(gn_compositor_create(NULL, &alone), 0);
+    assert_int_equal(
+        gn_compositor_put_linear(alone, &f->layers, &radiance, &linear, &f->options, &out), 0);
+    gn_compositor_destroy(&alone);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
         float a = f->rgba.data[i / 3 * 4 + 3], v = f->rgba.data[i / 3 * 4 + i % 3];
         float expected = (f->shadow.data[i] * radiance.data[i] + f->added.data[i]) * (1 - a) + v;
         assert_true(out.data[i] == expected); // all numbers are short: exact in float
     }
-    struct gn_pool *pool;
-    assert_int_equal(gn_pool_create(3, &pool), 0);
-    assert_int_equal(gn_composite_linear(&f->layers, &radiance, pool, &radiance), 0);
+    assert_int_equal(gn_compositor_put_linear(f->compositor, &f->layers, &radiance, &linear,
+                                              &f->options, &radiance),
+                     0);
     assert_memory_equal(radiance.data, out.data, WIDTH * HEIGHT * 3 * sizeof(float));
     /* The 8-bit way, through a linear response of 1/16 radiance per code step. */
-    struct gn_response linear = {.scale = 255.0 / 16};
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &linear, false, pool, &f->out),
-                     0);
+    assert_int_equal(put(f, &linear), 0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
         double a = (double)f->rgba.data[i / 3 * 4 + 3], v = (double)f->rgba.data[i / 3 * 4 + i % 3];
         double x = f->background.data[i] / 16.0;
         x = ((double)f->shadow.data[i] * x + (double)f->added.data[i]) * (1 - a) + v;
         assert_true(fabs(fmin(x * 16, 255) - f->out.data[i]) <= 0.501);
     }
-    gn_pool_destroy(&pool);
     gn_image_finish(&radiance);
     gn_image_finish(&out);
 }
@@ -150,9 +184,7 @@ static void test_codes_of_curves(void **state)
                                               : i < 18 ? 0.01f
                                                        : powf(10, (float)(i % 701) / 100 - 6);
         }
-        assert_int_equal(
-            gn_composite_image8(&f->layers, &f->background, &responses[r], false, NULL, &f->out),
-            0);
+        assert_int_equal(put(f, &responses[r]), 0);
         for (int i = 0; i < WIDTH * HEIGHT; i++) {
             float rgb[3];
             memcpy(rgb, f->rgba.data + 4 * i, sizeof(rgb));
@@ -170,13 +202,16 @@ static void test_refusals(void **state)
     struct gn_image small;
     assert_int_equal(gn_image_init(&small, WIDTH, HEIGHT - 1, 3), 0);
     f->layers.added = &small;
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out),
-                     -EINVAL);
-    assert_int_equal(gn_composite_linear(&f->layers, &small, NULL, &small), -EINVAL);
+    assert_int_equal(put(f, &r), -EINVAL);
+    assert_int_equal(
+        gn_compositor_put_linear(f->compositor, &f->layers, &small, &r, &f->options, &small),
+        -EINVAL);
     f->layers.added = NULL;
     r.scale = -1;
-    assert_int_equal(gn_composite_image8(&f->layers, &f->background, &r, false, NULL, &f->out),
-                     -EINVAL);
+    assert_int_equal(put(f, &r), -EINVAL);
+    r.scale = 0;
+    f->options.match.blur_px = NAN;
+    assert_int_equal(put(f, &r), -EINVAL);
     gn_image_finish(&small);
 }
 
@@ -185,6 +220,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_untouched, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_shadow_on_srgb, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_half_covered, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_formula, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_codes_of_curves, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_refusals, set_up, tear_down),
