@@ -16,8 +16,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-static inline void add_texel(struct gn_patch *patch, const struct gn_radiance_map *map,
-                             uint32_t texel)
+void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel)
 {
     const float *l = map->radiance.data + 3 * (size_t)texel;
     const float *d = map->direction_world + 3 * (size_t)texel;
@@ -37,20 +36,6 @@ static inline void add_texel(struct gn_patch *patch, const struct gn_radiance_ma
     patch->nearness += energy * (double)map->geometry->nearness[texel];
     for (int c = 0; c < 3; c++)
         patch->normal[c] += energy * (double)normal[c];
-}
-
-void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel)
-{
-    add_texel(patch, map, texel);
-}
-
-void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *map,
-                         const uint32_t *texels, size_t n)
-{
-    struct gn_patch sum = *patch; // a copy that nothing else points to stays in registers
-    for (size_t i = 0; i < n; i++)
-        add_texel(&sum, map, texels[i]);
-    *patch = sum;
 }
 
 void gn_patch_add(struct gn_patch *patch, const struct gn_patch *other)

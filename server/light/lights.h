@@ -30,9 +30,6 @@ struct gn_patch {
 
 /** Adds one texel of the map. */
 void gn_patch_add_texel(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t texel);
-/** Adds n texels, in order: the same sums to the bit. */
-void gn_patch_add_texels(struct gn_patch *patch, const struct gn_radiance_map *map,
-                         const uint32_t *texels, size_t n);
 /** Adds n texels from the first on: up to rounding, 1e-6, the same sums, and much faster. */
 void gn_patch_add_run(struct gn_patch *patch, const struct gn_radiance_map *map, uint32_t first,
                       uint32_t n);

@@ -98,8 +98,11 @@ static void classify(struct gn_partition *p, const struct measure *m)
     for (int r = 0; r < n_base; r++) {
         struct gn_region *region = &p->regions[r];
         region->is_bright = is_bright(p, m, r);
-        if (!region->is_bright)
-            gn_patch_add(&cells[gn_partition_plan_get_dark_cell(p->plan, r)].patch, &region->patch);
+        if (region->is_bright)
+            continue;
+        struct gn_region *cell = &cells[gn_partition_plan_get_dark_cell(p->plan, r)];
+        gn_patch_add(&cell->patch, &region->patch);
+        cell->n_runs += region->n_runs;
     }
     double solid_angle = p->map->figures.shown_solid_angle / n_base;
     for (int i = 0; i < p->plan->n_dark_cells; i++) {

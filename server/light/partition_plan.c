@@ -15,6 +15,9 @@ static const double pi = 3.14159265358979323846;
 /* The fill's cells are summed over this many directions: rows of equal solid angle. */
 enum { FILL_ROWS = 256, FILL_COLUMNS = 192 };
 
+/* More than there are: at most 1024 of a hemisphere. */
+enum { NO_REGION = 65535 };
+
 static void get_polar(const double dir[static 3], double out_polar[static 2])
 {
     out_polar[0] = atan2(hypot(dir[0], dir[1]), dir[2]);
@@ -100,47 +103,96 @@ int gn_partition_plan_get_dark_cell(const struct gn_partition_plan *plan, int re
            sector * d->dark_sectors / d->sectors;
 }
 
-/* Sorts the texels that show something by region, keeping their order within. */
-static int list_texels(struct gn_partition_plan *plan)
+/* So long that a region has a thousand runs: cuts need no finer ones. */
+static uint32_t choose_run_length(const struct gn_partition_plan *plan, size_t n_shown)
+{
+    double n = (double)n_shown / (1024.0 * plan->n_regions);
+    return n >= GN_REGION_RUN_MAX ? GN_REGION_RUN_MAX : n >= 8 ? 8 : 4;
+}
+
+/* Of a texel, or of the middle between two. */
+static void get_middle_polar(const struct gn_partition_plan *plan, const struct gn_texel_run *run,
+                             float out_polar[static 2])
 {
     const struct gn_map_table *t = plan->table;
-    size_t n = (size_t)t->projection.width * (size_t)t->projection.height, n_lit = 0;
-    uint16_t *region = calloc(n, sizeof(*region)); // n_regions <= 4096
-    plan->start = calloc((size_t)plan->n_regions + 1, sizeof(*plan->start));
-    if (!region || !plan->start) {
-        free(region);
-        return -ENOMEM;
+    const float *d = is_about_world_axis(plan) ? t->direction_world : t->direction_probe;
+    const float *a = d + 3 * (size_t)(run->texel + (run->n - 1) / 2);
+    const float *b = d + 3 * (size_t)(run->texel + run->n / 2);
+    double middle[3], polar[2];
+    for (int c = 0; c < 3; c++)
+        middle[c] = (double)a[c] + (double)b[c];
+    get_polar(middle, polar);
+    out_polar[0] = (float)polar[0];
+    out_polar[1] = (float)polar[1];
+}
+
+/* Counts the runs by region; or puts each where its region's next one belongs. */
+static void visit_runs(struct gn_partition_plan *plan, const uint16_t *region, uint32_t longest,
+                       uint32_t *next)
+{
+    uint32_t width = (uint32_t)plan->table->projection.width;
+    uint32_t n = width * (uint32_t)plan->table->projection.height;
+    for (uint32_t i = 0; i < n;) {
+        uint32_t end = i + 1, row_end = i - i % width + width;
+        while (end < row_end && end < i + longest && region[end] == region[i])
+            end++;
+        if (region[i] != NO_REGION) {
+            uint32_t slot = next[region[i]]++;
+            if (plan->run) {
+                plan->run[slot] = (struct gn_texel_run){i, end - i};
+                get_middle_polar(plan, &plan->run[slot], plan->polar[slot]);
+            }
+        }
+        i = end;
     }
+}
+
+/* Finds the region of each texel that shows something; returns how many do. */
+static size_t find_regions(struct gn_partition_plan *plan, uint16_t *region)
+{
+    const struct gn_map_table *t = plan->table;
+    size_t n = (size_t)t->projection.width * (size_t)t->projection.height, n_shown = 0;
     for (size_t i = 0; i < n; i++) {
         double polar[2];
+        region[i] = NO_REGION;
         if (!(t->solid_angle[i] > 0))
             continue;
         gn_partition_plan_get_polar(plan, (uint32_t)i, polar);
         region[i] = (uint16_t)gn_partition_plan_find_region(plan, polar);
-        plan->start[region[i] + 1]++;
-        n_lit++;
+        plan->solid_angle[region[i]] += (double)t->solid_angle[i];
+        n_shown++;
     }
-    for (int r = 0; r < plan->n_regions; r++)
-        plan->start[r + 1] += plan->start[r];
-    plan->texel = calloc(n_lit + 1, sizeof(*plan->texel));
-    plan->polar = calloc(n_lit + 1, 2 * sizeof(*plan->polar));
-    uint32_t *next = malloc((size_t)plan->n_regions * sizeof(*next));
-    bool is_ok = plan->texel && plan->polar && next;
-    if (is_ok)
-        memcpy(next, plan->start, (size_t)plan->n_regions * sizeof(*next));
-    for (size_t i = 0; is_ok && i < n; i++) {
-        double polar[2];
-        if (!(t->solid_angle[i] > 0))
-            continue;
-        uint32_t slot = next[region[i]]++;
-        gn_partition_plan_get_polar(plan, (uint32_t)i, polar);
-        plan->texel[slot] = (uint32_t)i;
-        plan->polar[2 * (size_t)slot] = (float)polar[0];
-        plan->polar[2 * (size_t)slot + 1] = (float)polar[1];
+    return n_shown;
+}
+
+/* Sorts the texels that show something by region, in the map's order within. */
+static int list_runs(struct gn_partition_plan *plan)
+{
+    const struct gn_projection *p = &plan->table->projection;
+    size_t n_regions = (size_t)plan->n_regions;
+    uint16_t *region = malloc((size_t)p->width * (size_t)p->height * sizeof(*region));
+    uint32_t *next = calloc(n_regions, sizeof(*next));
+    int rc = -ENOMEM;
+    plan->solid_angle = calloc(n_regions, sizeof(*plan->solid_angle));
+    plan->start = calloc(n_regions + 1, sizeof(*plan->start));
+    if (!region || !next || !plan->solid_angle || !plan->start)
+        goto out;
+    uint32_t longest = choose_run_length(plan, find_regions(plan, region));
+    visit_runs(plan, region, longest, next);
+    for (size_t r = 0; r < n_regions; r++) {
+        plan->start[r + 1] = plan->start[r] + next[r];
+        next[r] = plan->start[r];
     }
+    plan->run = calloc((size_t)plan->start[n_regions] + 1, sizeof(*plan->run));
+    plan->polar = calloc((size_t)plan->start[n_regions] + 1, sizeof(*plan->polar));
+    if (!plan->run || !plan->polar)
+        goto out;
+    visit_runs(plan, region, longest, next);
+    rc = 0;
+out:
     free(next);
     free(region);
-    return is_ok ? 0 : -ENOMEM;
+    return rc;
 }
 
 /* Divides the sphere about the pole as dark regions are, and keeps what the map does not show. */
@@ -191,7 +243,7 @@ static int fill_plan(struct gn_partition_plan *plan)
     plan->n_rings = (int)fmax(lround(d->rings * hemispheres), 1);
     plan->n_regions = plan->n_rings * d->sectors;
     plan->n_dark_cells = count_dark_rings(plan) * d->dark_sectors;
-    int rc = list_texels(plan);
+    int rc = list_runs(plan);
     return rc < 0 ? rc : list_fill_cells(plan);
 }
 
@@ -232,8 +284,9 @@ void gn_partition_plan_unref(struct gn_partition_plan **plan)
         return;
     free(p->fill_cell);
     free(p->polar);
-    free(p->texel);
+    free(p->run);
     free(p->start);
+    free(p->solid_angle);
     gn_map_table_unref(&p->table);
     free(p);
 }

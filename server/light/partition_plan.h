@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * The base division of a map: rings and sectors, which texel lies in which region, and the cells of
+ * The base division of a map: rings and sectors, which texels lie in which region, and the cells of
  * the directions that the map does not show. Depends on no pixel: shared by the frames of a stream.
  */
 #ifndef GN_SERVER_LIGHT_PARTITION_PLAN_H
@@ -32,6 +32,14 @@ struct gn_polar_box {
     double low[2], high[2]; // theta in [0, pi], phi in [-pi, pi]
 };
 
+/** Most texels of a region's run. */
+#define GN_REGION_RUN_MAX 16
+
+/** n texels side by side in a row of the map. */
+struct gn_texel_run {
+    uint32_t texel, n;
+};
+
 /** Thread-safety: immutable after create; shared (ref). */
 struct gn_partition_plan {
     _Atomic int references;
@@ -41,9 +49,10 @@ struct gn_partition_plan {
     int n_rings;                    // of it
     int n_regions;                  // n_rings * sectors
     int n_dark_cells;               // coarser cells of it
+    double *solid_angle;            // [n_regions] sr shown, owned
     uint32_t *start;                // [n_regions + 1] into the following, owned
-    uint32_t *texel;                // [n] index into the map, by region, owned
-    float *polar;                   // [n][2] theta, phi of the same, owned
+    struct gn_texel_run *run;       // by region: all texels that show something, owned
+    float (*polar)[2];              // theta, phi of the same, their middles, owned
     int n_fill_cells;               // 0 where all is shown
     struct gn_fill_cell *fill_cell; // owned
 };

@@ -57,10 +57,11 @@ static int remember(struct gn_light_memory *memory, const struct gn_map_samples 
 /* Light too little for one sample is one light. */
 static int add_whole(const struct gn_light_input *input, struct gn_light_list *list)
 {
+    const struct gn_partition_plan *plan = input->plan;
     struct gn_patch patch = {0};
     struct gn_light light;
-    gn_patch_add_texels(&patch, input->map, input->plan->texel,
-                        input->plan->start[input->plan->n_regions]);
+    for (uint32_t k = 0; k < plan->start[plan->n_regions]; k++)
+        gn_patch_add_run(&patch, input->map, plan->run[k].texel, plan->run[k].n);
     if (!gn_patch_get_light(&patch, &light))
         return 0;
     light.id = GN_PENROSE_LIGHT_ID;

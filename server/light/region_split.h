@@ -11,12 +11,15 @@
 
 #include "server/light/partition_plan.h"
 
+#define GN_NO_RUN UINT32_MAX
+
 /** Texels side by side, or a sample. */
 struct gn_split_item {
     float polar[2]; // theta, phi
     float weight;   // >= 0; only ratios matter
     uint32_t texel; // the first
     uint32_t n;     // of consecutive ones; 1 for a sample
+    uint32_t run;   // that they are, of the plan's; or GN_NO_RUN: one texel of some run
 };
 
 /** How to cut. */
