@@ -4,7 +4,13 @@
 
 #include <stddef.h>
 
-atomic_long gn_test_n_allocations;
+atomic_long gn_test_n_allocations, gn_test_allocated_bytes;
+
+static void count(size_t bytes)
+{
+    gn_test_n_allocations++;
+    gn_test_allocated_bytes += (long)bytes;
+}
 
 // The linker's names for what --wrap redirects.
 void *__real_malloc(size_t size);
@@ -18,24 +24,24 @@ void *__wrap_aligned_alloc(size_t alignment, size_t size);
 
 void *__wrap_malloc(size_t size)
 {
-    gn_test_n_allocations++;
+    count(size);
     return __real_malloc(size);
 }
 
 void *__wrap_calloc(size_t n, size_t size)
 {
-    gn_test_n_allocations++;
+    count(n * size);
     return __real_calloc(n, size);
 }
 
 void *__wrap_realloc(void *p, size_t size)
 {
-    gn_test_n_allocations++;
+    count(size);
     return __real_realloc(p, size);
 }
 
 void *__wrap_aligned_alloc(size_t alignment, size_t size)
 {
-    gn_test_n_allocations++;
+    count(size);
     return __real_aligned_alloc(alignment, size);
 }

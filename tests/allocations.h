@@ -12,5 +12,7 @@
 
 /** Calls so far. Thread-safety: safe. */
 extern atomic_long gn_test_n_allocations;
+/** Bytes that they asked for. Thread-safety: safe. */
+extern atomic_long gn_test_allocated_bytes;
 
 #endif

@@ -6,17 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "common/half.h"
 #include "server/light/luminance.h"
-
-int gn_pixel_layout_get_bytes(enum gn_pixel_layout layout)
-{
-    static const int bytes[GN_PIXELS_COUNT] = {
-        [GN_PIXELS_RGB_F32] = 12, [GN_PIXELS_RGB_F16] = 6, [GN_PIXELS_MONO_U16] = 2,
-        [GN_PIXELS_RGB_U16] = 6,  [GN_PIXELS_RGB_U8] = 3,
-    };
-    return bytes[layout];
-}
+#include "server/light/map_pixels.h"
 
 void gn_map_reader_init(struct gn_map_reader *reader)
 {
@@ -28,155 +19,6 @@ void gn_map_reader_init(struct gn_map_reader *reader)
     for (int i = 0; i < 9; i++)
         reader->has_matrix = reader->has_matrix || response->to_rec709[i] != 0;
     reader->has_curve = !reader->codes && response->type != GN_RESPONSE_LINEAR;
-}
-
-static uint16_t get_u16(const uint8_t *p)
-{
-    return (uint16_t)(p[0] | p[1] << 8);
-}
-
-static uint32_t get_u32(const uint8_t *p)
-{
-    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
-
-static const uint8_t *get_raw(const struct gn_map_reader *r, int x, int y)
-{
-    size_t i = (size_t)y * (size_t)r->table->projection.width + (size_t)x;
-    return r->frame->raw + i * (size_t)gn_pixel_layout_get_bytes(r->frame->layout);
-}
-
-/* Not a finite number >= 0, or -0: the sign bit, or exponents of infinity and NaN carried there. */
-static uint32_t get_fault_bit(uint32_t bits)
-{
-    return (bits | (bits + 0x00800000u)) & 0x80000000u;
-}
-
-/* n floats as they are. Whether any of them has to be mended. */
-static bool fetch_f32(const uint8_t *raw, int n, float *restrict out)
-{
-    uint32_t faults = 0;
-    for (int i = 0; i < n; i++) {
-        uint32_t bits = get_u32(raw + 4 * (size_t)i);
-        faults |= get_fault_bit(bits);
-        memcpy(out + i, &bits, sizeof(bits));
-    }
-    return faults != 0;
-}
-
-static bool fetch_f16(const uint8_t *raw, int n, float *restrict out)
-{
-    uint32_t faults = 0;
-    for (int i = 0; i < n; i++) {
-        uint32_t bits;
-        out[i] = gn_half_to_float(get_u16(raw + 2 * (size_t)i));
-        memcpy(&bits, out + i, sizeof(bits));
-        faults |= get_fault_bit(bits);
-    }
-    return faults != 0;
-}
-
-/* The largest of n codes. */
-static int get_largest_u16(const uint8_t *raw, int n)
-{
-    int largest = 0;
-    for (int i = 0; i < n; i++) {
-        int code = get_u16(raw + 2 * (size_t)i);
-        largest = code > largest ? code : largest;
-    }
-    return largest;
-}
-
-/* Counts pixels with a code at the rail or above. */
-static int count_clipped_u16(const uint8_t *raw, int n, int n_codes, int code_max)
-{
-    int n_clipped = 0;
-    for (int i = 0; i < n; i++, raw += 2 * n_codes) {
-        bool is_clipped = false;
-        for (int c = 0; c < n_codes; c++)
-            is_clipped = is_clipped || get_u16(raw + 2 * c) >= code_max;
-        n_clipped += is_clipped;
-    }
-    return n_clipped;
-}
-
-/* n pixels of 16-bit codes, 1 or 3 of them each. A row with codes that are none stays black: the
- * frame is refused. */
-static void fetch_u16(const struct gn_code_table *codes, const uint8_t *raw, int n, int n_codes,
-                      float *restrict out, struct gn_map_row *row)
-{
-    const float *linear = codes->linear;
-    row->largest_code = get_largest_u16(raw, n * n_codes);
-    if (row->largest_code >= codes->code_max)
-        row->n_clipped = count_clipped_u16(raw, n, n_codes, codes->code_max);
-    if (row->largest_code > codes->code_max) {
-        memset(out, 0, 3 * (size_t)n * sizeof(*out));
-    } else if (n_codes == 1) {
-        for (int i = 0; i < n; i++)
-            out[3 * i] = out[3 * i + 1] = out[3 * i + 2] = linear[get_u16(raw + 2 * (size_t)i)];
-    } else {
-        for (int i = 0; i < 3 * n; i++)
-            out[i] = linear[get_u16(raw + 2 * (size_t)i)];
-    }
-}
-
-static void fetch_u8(const struct gn_code_table *codes, const uint8_t *raw, int n, float *out,
-                     struct gn_map_row *row)
-{
-    for (int i = 0; i < n; i++, raw += 3, out += 3) {
-        bool is_clipped = false;
-        for (int c = 0; c < 3; c++) {
-            out[c] = codes->linear[raw[c]];
-            is_clipped = is_clipped || raw[c] == 255;
-        }
-        row->n_clipped += is_clipped;
-    }
-}
-
-/* Of a float image, whose codes may be those of an integer format as shares of full scale. */
-static bool fetch_image(const struct gn_map_reader *r, int x, int y, int n, float *out,
-                        struct gn_map_row *row)
-{
-    const struct gn_image *image = r->frame->codes;
-    bool is_mono = image->channels < 3, is_faulty = false;
-    for (int i = 0; i < n; i++) {
-        const float *code = gn_image_at(image, x + i, y);
-        bool is_clipped = false;
-        for (int c = 0; c < 3; c++) {
-            float v = code[is_mono ? 0 : c];
-            is_faulty = is_faulty || !(v >= 0 && v < INFINITY);
-            is_clipped = is_clipped || (r->frame->code_max > 0 && v >= 1);
-            if (r->codes && v >= 0)
-                v = r->codes->linear[lrintf(fminf(v, 1) * (float)r->codes->code_max)];
-            out[3 * i + c] = v;
-        }
-        row->n_clipped += is_clipped;
-    }
-    return is_faulty;
-}
-
-/* Device values of n texels, not yet mended. Whether there is something to mend. */
-static bool fetch(const struct gn_map_reader *r, int x, int y, int n, float *out,
-                  struct gn_map_row *row)
-{
-    enum gn_pixel_layout layout = r->frame->layout;
-    switch (layout) {
-    case GN_PIXELS_RGB_F32:
-        return fetch_f32(get_raw(r, x, y), 3 * n, out);
-    case GN_PIXELS_RGB_F16:
-        return fetch_f16(get_raw(r, x, y), 3 * n, out);
-    case GN_PIXELS_MONO_U16:
-        fetch_u16(r->codes, get_raw(r, x, y), n, 1, out, row);
-        return false;
-    case GN_PIXELS_RGB_U16:
-        fetch_u16(r->codes, get_raw(r, x, y), n, 3, out, row);
-        return false;
-    case GN_PIXELS_RGB_U8:
-        fetch_u8(r->codes, get_raw(r, x, y), n, out, row);
-        return false;
-    default:
-        return fetch_image(r, x, y, n, out, row);
-    }
 }
 
 /* What cannot be light is dark, for now where it is infinite. */
@@ -196,45 +38,65 @@ static void mend(float *rgb, int n, struct gn_map_row *row)
     }
 }
 
-/* Matrix and scale of one texel. Where a channel falls below 0 it is clamped, and the others are
- * lowered so that the luminance stays. */
-static bool multiply(const double m[static 9], double rgb[static 3])
+/* Of a channel below 0: it is clamped, and the others are lowered so that the luminance stays. */
+static void clamp_to_gamut(double v[static 3])
 {
-    double v[3], before = 0, after = 0;
-    bool is_out = false;
-    for (int c = 0; c < 3; c++) {
-        v[c] = m[3 * c] * rgb[0] + m[3 * c + 1] * rgb[1] + m[3 * c + 2] * rgb[2];
-        is_out = is_out || v[c] < 0;
-    }
-    memcpy(rgb, v, sizeof(v));
-    if (!is_out)
-        return false;
     static const double y[3] = {GN_LUMINANCE_R, GN_LUMINANCE_G, GN_LUMINANCE_B};
+    double before = 0, after = 0;
     for (int c = 0; c < 3; c++) {
         before += y[c] * v[c];
         after += y[c] * fmax(v[c], 0);
     }
     for (int c = 0; c < 3; c++)
-        rgb[c] = before > 0 ? fmax(v[c], 0) * (before / after) : 0;
-    return true;
+        v[c] = before > 0 ? fmax(v[c], 0) * (before / after) : 0;
 }
 
-/* Device values to radiance: curve, matrix and scale, the lens's fall-off. */
+/* Matrix and scale, then the lens's fall-off: a few texels at a time, so that only those have to be
+ * looked at again among which a channel falls below 0. */
+static void multiply(const double m[static 9], const float *gain, float *rgb, int n,
+                     struct gn_map_row *row)
+{
+    enum { N_FEW = 32 };
+    double v[N_FEW][3];
+    for (; n > 0; n -= N_FEW, rgb += 3 * N_FEW) {
+        int n_few = n < N_FEW ? n : N_FEW;
+        double lowest = 0;
+        for (int i = 0; i < n_few; i++) {
+            double r = (double)rgb[3 * i], g = (double)rgb[3 * i + 1], b = (double)rgb[3 * i + 2];
+            for (int c = 0; c < 3; c++) {
+                v[i][c] = m[3 * c] * r + m[3 * c + 1] * g + m[3 * c + 2] * b;
+                lowest = v[i][c] < lowest ? v[i][c] : lowest;
+            }
+        }
+        for (int i = 0; i < n_few && lowest < 0; i++) {
+            if (v[i][0] < 0 || v[i][1] < 0 || v[i][2] < 0) {
+                clamp_to_gamut(v[i]);
+                row->n_out_of_gamut++;
+            }
+        }
+        for (int i = 0; i < n_few; i++)
+            for (int c = 0; c < 3; c++)
+                rgb[3 * i + c] = v[i][c] > 0 ? (float)(v[i][c] * (gain ? (double)gain[i] : 1)) : 0;
+        gain = gain ? gain + N_FEW : NULL;
+    }
+}
+
+/* Device values, >= 0, to radiance: curve, matrix and scale, the lens's fall-off. What lies beyond
+ * float's range is infinite then, and capped. */
 static void calibrate(const struct gn_map_reader *r, const float *gain, float *rgb, int n,
                       struct gn_map_row *row)
 {
-    for (int i = 0; i < n; i++, rgb += 3) {
-        double v[3], factor = gain ? (double)gain[i] : 1;
-        for (int c = 0; c < 3; c++) // a curve may leave float's range, and a matrix has zeros
-            v[c] = r->has_curve ? fmin((double)gn_response_decode(&r->frame->response, rgb[c]),
-                                       (double)FLT_MAX)
-                                : (double)rgb[c];
-        if (r->has_matrix)
-            row->n_out_of_gamut += multiply(r->matrix, v);
-        else
-            factor *= r->scale;
-        for (int c = 0; c < 3; c++) // beyond float's range it is infinite, and capped
-            rgb[c] = v[c] > 0 ? (float)fmin(v[c] * factor, 2 * (double)GN_RADIANCE_MAX) : 0;
+    for (int i = 0; i < 3 * n && r->has_curve; i++) // a curve may leave float's range
+        rgb[i] = fminf(gn_response_decode(&r->frame->response, rgb[i]), FLT_MAX);
+    if (r->has_matrix) {
+        multiply(r->matrix, gain, rgb, n, row);
+    } else if (gain) {
+        for (int i = 0; i < n; i++)
+            for (int c = 0; c < 3; c++)
+                rgb[3 * i + c] = (float)((double)rgb[3 * i + c] * ((double)gain[i] * r->scale));
+    } else if (r->scale != 1) {
+        for (int i = 0; i < 3 * n; i++)
+            rgb[i] = (float)((double)rgb[i] * r->scale);
     }
 }
 
@@ -267,49 +129,63 @@ static float get_max(const float *v, int n)
 /* Texels that are summed side by side: their values are a whole number of vectors. */
 enum { N_ABREAST = 4, N_LANES = 3 * N_ABREAST };
 
-/* Sums n texels of one weight for all. */
-static void sum_alike(const float *l, double weight, int n, struct gn_map_row *row)
+/* Sums n texels. */
+static inline void sum_alike(const float *l, int n, double sum[static 3])
 {
-    double sum[N_LANES] = {0};
+    double lane[N_LANES] = {0};
     int i = 0;
     for (; i + N_ABREAST <= n; i += N_ABREAST)
         for (int j = 0; j < N_LANES; j++)
-            sum[j] += (double)l[3 * i + j];
-    for (int j = 0; j < 3 * (n - i); j++)
-        sum[j] += (double)l[3 * i + j];
+            lane[j] += (double)l[3 * i + j];
+    for (; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += (double)l[3 * i + c];
     for (int j = 0; j < N_LANES; j++)
-        row->irradiance[j % 3] += sum[j] * weight;
+        sum[j % 3] += lane[j];
 }
 
-/* Sums n texels, each of its own weight; and upward, where there is something to fill. */
-static void sum_weighted(const float *l, const float *weight, const float *up_weight, int n,
-                         struct gn_map_row *row)
+/* Sums n texels, each of its own weight. */
+static inline void sum_weighted(const float *l, const float *weight, int n, double sum[static 3])
 {
-    double sum[3] = {0}, upward[3] = {0};
-    for (int i = 0; i < n; i++, l += 3) {
-        double w = (double)weight[i], up = up_weight ? (double)up_weight[i] : 0;
-        for (int c = 0; c < 3; c++) {
-            sum[c] += (double)l[c] * w;
-            upward[c] += (double)l[c] * up;
-        }
-    }
-    memcpy(row->irradiance, sum, sizeof(sum));
-    memcpy(row->upward, upward, sizeof(upward));
+    double s[3] = {0};
+    for (int i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            s[c] += (double)l[3 * i + c] * (double)weight[i];
+    memcpy(sum, s, sizeof(s));
 }
 
+/* Patch by patch, whose sums make the row's. */
 static void sum_row(const struct gn_map_reader *r, int y, struct gn_map_row *row)
 {
     const struct gn_map_table *t = r->table;
-    size_t start = (size_t)y * (size_t)t->projection.width + (size_t)t->span[2 * y];
-    int n = t->span[2 * y + 1] - t->span[2 * y];
-    const float *l = r->radiance + 3 * start;
+    size_t start = (size_t)y * (size_t)t->projection.width;
+    const float *l = r->radiance + 3 * start, *weight = t->weight + start;
+    int begin = t->span[2 * y], end = t->span[2 * y + 1], side = t->patch_side;
     memset(row->irradiance, 0, sizeof(row->irradiance));
     memset(row->upward, 0, sizeof(row->upward));
-    row->max_channel = get_max(l, 3 * n);
-    if (t->has_row_weights)
-        sum_alike(l, (double)t->weight[start], n, row);
-    else
-        sum_weighted(l, t->weight + start, t->up_weight ? t->up_weight + start : NULL, n, row);
+    memset(row->luminance, 0, sizeof(row->luminance));
+    row->max_channel = get_max(l + 3 * begin, 3 * (end - begin));
+    for (int x = begin; x < end;) {
+        int patch = x / side, n = (patch + 1) * side < end ? (patch + 1) * side - x : end - x;
+        double sum[3] = {0};
+        if (t->has_row_weights)
+            sum_alike(l + 3 * x, n, sum);
+        else
+            sum_weighted(l + 3 * x, weight + x, n, sum);
+        row->luminance[patch] =
+            GN_LUMINANCE_R * sum[0] + GN_LUMINANCE_G * sum[1] + GN_LUMINANCE_B * sum[2];
+        for (int c = 0; c < 3; c++)
+            row->irradiance[c] += sum[c];
+        x += n;
+    }
+    if (t->has_row_weights && begin < end) {
+        for (int c = 0; c < 3; c++)
+            row->irradiance[c] *= (double)weight[begin];
+        for (int k = 0; k < GN_MAP_PATCHES; k++)
+            row->luminance[k] *= (double)weight[begin];
+    }
+    if (t->up_weight)
+        sum_weighted(l + 3 * begin, t->up_weight + start + begin, end - begin, row->upward);
 }
 
 double gn_map_row_get_max_luminance(const struct gn_map_reader *reader, int y)
@@ -332,7 +208,7 @@ void gn_map_row_read(const struct gn_map_reader *reader, int y, struct gn_map_ro
     *out_row = (struct gn_map_row){0};
     memset(row, 0, 3 * (size_t)begin * sizeof(*row));
     memset(shown + 3 * n, 0, 3 * (size_t)(width - begin - n) * sizeof(*row));
-    if (fetch(reader, begin, y, n, shown, out_row))
+    if (gn_map_pixels_fetch(reader, begin, y, n, shown, out_row))
         mend(shown, n, out_row);
     if (reader->has_curve || reader->has_matrix || reader->scale != 1 || t->gain)
         calibrate(reader, t->gain ? t->gain + (size_t)y * (size_t)width + begin : NULL, shown, n,
@@ -342,27 +218,6 @@ void gn_map_row_read(const struct gn_map_reader *reader, int y, struct gn_map_ro
         cap(shown, n, out_row);
         sum_row(reader, y, out_row);
     }
-}
-
-static bool is_infinite_texel(const struct gn_map_reader *r, int x, int y)
-{
-    const struct gn_environment_frame *frame = r->frame;
-    bool is_image = frame->layout == GN_PIXELS_IMAGE;
-    int n = is_image && frame->codes->channels < 3 ? 1 : 3;
-    for (int c = 0; c < n; c++) {
-        float v = 0;
-        if (is_image) {
-            v = gn_image_at(frame->codes, x, y)[c];
-        } else if (frame->layout == GN_PIXELS_RGB_F32) {
-            uint32_t bits = get_u32(get_raw(r, x, y) + 4 * c);
-            memcpy(&v, &bits, sizeof(v));
-        } else if (frame->layout == GN_PIXELS_RGB_F16) {
-            v = gn_half_to_float(get_u16(get_raw(r, x, y) + 2 * c));
-        }
-        if (v == INFINITY)
-            return true;
-    }
-    return false;
 }
 
 static float get_median(float *v, int n)
@@ -388,7 +243,7 @@ static void mend_infinite_texel(const struct gn_map_reader *r, int x, int y)
         if (i == 4 || !gn_projection_step(&t->projection, i % 3 - 1, i / 3 - 1, at))
             continue;
         size_t texel = (size_t)at[1] * width + (size_t)at[0];
-        if (!(t->solid_angle[texel] > 0) || is_infinite_texel(r, at[0], at[1]))
+        if (!(t->solid_angle[texel] > 0) || gn_map_pixels_is_infinite(r, at[0], at[1]))
             continue;
         for (int c = 0; c < 3; c++)
             values[c][n] = r->radiance[3 * texel + (size_t)c];
@@ -404,7 +259,7 @@ void gn_map_row_mend(const struct gn_map_reader *reader, int y, struct gn_map_ro
     if (row->n_inf == 0)
         return;
     for (int x = t->span[2 * y]; x < t->span[2 * y + 1]; x++)
-        if (is_infinite_texel(reader, x, y))
+        if (gn_map_pixels_is_infinite(reader, x, y))
             mend_infinite_texel(reader, x, y);
     sum_row(reader, y, row);
 }

@@ -19,8 +19,9 @@ struct gn_map_row {
     int n_nan, n_inf, n_negative, n_capped, n_clipped, n_out_of_gamut;
     int largest_code; // of integer layouts
     float max_channel;
-    double irradiance[3]; // sum of L dOmega
-    double upward[3];     // sum of L max(0, d . axis) dOmega; 0 for whole spheres
+    double irradiance[3];             // sum of L dOmega
+    double upward[3];                 // sum of L max(0, d . axis) dOmega; 0 for whole spheres
+    double luminance[GN_MAP_PATCHES]; // sum of Y dOmega over its texels in each patch
 };
 
 /** How the rows of one frame are read. */

@@ -10,6 +10,7 @@
 
 #include "server/light/radiance_map.h"
 #include "server/light/sh.h"
+#include "server/light/temporal_change.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -248,6 +249,14 @@ static void fill_matrix(struct gn_map_table *t)
         t->axis_world[i] = t->world_from_probe[3 * i + 2];
 }
 
+/* Whole numbers of four texels are summed faster. */
+static int choose_patch_side(const struct gn_projection *p)
+{
+    int longer = p->width > p->height ? p->width : p->height;
+    int side = (longer + GN_MAP_PATCHES - 1) / GN_MAP_PATCHES;
+    return side < 16 ? side : (side + 3) / 4 * 4;
+}
+
 static int fill_table(struct gn_map_table *t, const struct gn_map_table *previous,
                       struct gn_pool *pool)
 {
@@ -269,7 +278,8 @@ static int fill_table(struct gn_map_table *t, const struct gn_map_table *previou
         list_rim(t) < 0)
         return -ENOMEM;
     sum_solid_angles(t);
-    return make_weights(t);
+    int rc = make_weights(t);
+    return rc < 0 ? rc : gn_change_windows_create(t, &t->windows);
 }
 
 int gn_map_table_create(const struct gn_projection *projection, const double rotation[static 4],
@@ -287,6 +297,7 @@ int gn_map_table_create(const struct gn_projection *projection, const double rot
         return -ENOMEM;
     atomic_init(&t->references, 1);
     t->projection = *projection;
+    t->patch_side = choose_patch_side(projection);
     if (previous) // a stream that turns: its working memory goes along
         atomic_init(&t->scratch, atomic_exchange(&previous->scratch, NULL));
     memcpy(t->rotation, rotation, sizeof(t->rotation));
@@ -311,10 +322,13 @@ void gn_map_table_unref(struct gn_map_table **table)
     *table = NULL;
     if (!t || atomic_fetch_sub_explicit(&t->references, 1, memory_order_acq_rel) != 1)
         return;
-    struct gn_radiance_map *spare = atomic_load_explicit(&t->spare, memory_order_relaxed);
-    if (spare)
-        gn_radiance_map_free(spare);
+    for (int i = 0; i < GN_MAP_SPARES; i++) {
+        struct gn_radiance_map *spare = atomic_load_explicit(&t->spare[i], memory_order_relaxed);
+        if (spare)
+            gn_radiance_map_free(spare);
+    }
     gn_scratch_finish(&t->scratch);
+    gn_change_windows_destroy(&t->windows);
     free(t->up_weight);
     free(t->own_weight);
     free(t->rim);

@@ -16,10 +16,16 @@
 #include "proto/attr.h"
 #include "server/light/scratch.h"
 
-struct gn_radiance_map; // server/light/radiance_map.h
+struct gn_change_windows; // server/light/temporal_change.h
+struct gn_radiance_map;   // server/light/radiance_map.h
 
 /** Texels on a side of a block. */
 #define GN_MAP_BLOCK 8
+/** Freed maps that are kept: a frame makes one, and one more where small suns are taken out of it.
+ */
+#define GN_MAP_SPARES 2
+/** Most patches along a map's side: squares of texels whose sums say where the light is. */
+#define GN_MAP_PATCHES 48
 
 /** Thread-safety: immutable after create but for what is spare, which is atomic; shared (ref). */
 struct gn_map_table {
@@ -43,14 +49,16 @@ struct gn_map_table {
     float *own_weight;          // weight, where it is not solid_angle; owned
     int n_rim;                  // texels cut by the circle whose centres lie outside it
     uint32_t *rim;              // [n_rim][2]: such a texel, the inner one it takes its light of
-    double shown_solid_angle;   // sr
-    double fill_solid_angle;    // sr, of the directions not shown
-    double fill_harmonics[25];  // integral over them of the basis of server/light/sh.h, order 4,
-                                // probe axes
-    double axis_world[3];       // optical axis; z of the frame of a whole sphere's picture
-    _Atomic(struct gn_radiance_map *) spare; // a freed map, its pixels and rows, or NULL; taken by
-                                             // the next one
-    gn_scratch_place scratch;                // working memory between frames
+    int patch_side;             // texels, of the map's GN_MAP_PATCHES^2 patches at most
+    struct gn_change_windows *windows; // which patches lie in which window; owned
+    double shown_solid_angle;          // sr
+    double fill_solid_angle;           // sr, of the directions not shown
+    double fill_harmonics[25]; // integral over them of the basis of server/light/sh.h, order 4,
+                               // probe axes
+    double axis_world[3];      // optical axis; z of the frame of a whole sphere's picture
+    _Atomic(struct gn_radiance_map *) spare[GN_MAP_SPARES]; // freed maps, their pixels and rows, or
+                                                            // NULL; taken by the next ones
+    gn_scratch_place scratch;                               // working memory between frames
 };
 
 /**

@@ -184,8 +184,9 @@ static int get_blank(const struct gn_projection *projection, const struct gn_pos
                                  pool, &table);
     if (rc < 0)
         return rc;
-    struct gn_radiance_map *map =
-        atomic_exchange_explicit(&table->spare, NULL, memory_order_acquire);
+    struct gn_radiance_map *map = NULL;
+    for (int i = 0; i < GN_MAP_SPARES && !map; i++)
+        map = atomic_exchange_explicit(&table->spare[i], NULL, memory_order_acquire);
     if (!map) {
         map = calloc(1, sizeof(*map));
         if (map) {
@@ -299,7 +300,8 @@ void gn_radiance_map_unref(struct gn_radiance_map **map)
     gn_map_geometry_unref(&m->geometry);
     gn_code_table_unref(&m->codes);
     m->table = NULL;
-    m = atomic_exchange_explicit(&table->spare, m, memory_order_acq_rel);
+    for (int i = 0; i < GN_MAP_SPARES && m; i++) // the place of none, or of one that is freed
+        m = atomic_exchange_explicit(&table->spare[i], m, memory_order_acq_rel);
     if (m)
         gn_radiance_map_free(m);
     gn_map_table_unref(&table);

@@ -33,10 +33,10 @@ const double gn_sh_factor[GN_SH_MAX] = {
 
 void gn_sh_get_basis(int order, const double dir[static 3], double out_basis[static GN_SH_MAX])
 {
-    double x = dir[0], y = dir[1], z = dir[2];
-    GN_SH_POLYNOMIALS_2(out_basis, 1, x, y, z);
+    double x = dir[0], y = dir[1], z = dir[2], xx = x * x, yy = y * y, zz = z * z;
+    GN_SH_POLYNOMIALS_2(out_basis, 1, x, y, z, xx, yy, zz);
     if (order > 2)
-        GN_SH_POLYNOMIALS_4(out_basis, x, y, z);
+        GN_SH_POLYNOMIALS_4(out_basis, x, y, z, xx, yy, zz);
     for (int k = 0; k < gn_sh_get_count(order); k++)
         out_basis[k] *= gn_sh_factor[k];
 }

@@ -12,8 +12,9 @@
 /** The harmonics are polynomials of the direction times these. */
 extern const double gn_sh_factor[GN_SH_MAX];
 
-/** The polynomials p[0 ... 8] in the direction (x, y, z), for numbers and for vectors of them. */
-#define GN_SH_POLYNOMIALS_2(p, one, x, y, z)                                                       \
+/** The polynomials p[0 ... 8] in the direction (x, y, z) of squares xx, yy, zz, for numbers and for
+ * vectors of them. */
+#define GN_SH_POLYNOMIALS_2(p, one, x, y, z, xx, yy, zz)                                           \
     do {                                                                                           \
         (p)[0] = (one);                                                                            \
         (p)[1] = (y);                                                                              \
@@ -21,28 +22,28 @@ extern const double gn_sh_factor[GN_SH_MAX];
         (p)[3] = (x);                                                                              \
         (p)[4] = (x) * (y);                                                                        \
         (p)[5] = (y) * (z);                                                                        \
-        (p)[6] = 3.0f * (z) * (z) - (one);                                                         \
+        (p)[6] = 3.0f * (zz) - (one);                                                              \
         (p)[7] = (x) * (z);                                                                        \
-        (p)[8] = (x) * (x) - (y) * (y);                                                            \
+        (p)[8] = (xx) - (yy);                                                                      \
     } while (0)
 
 /** p[9 ... 24], from p[0 ... 8]. */
-#define GN_SH_POLYNOMIALS_4(p, x, y, z)                                                            \
+#define GN_SH_POLYNOMIALS_4(p, x, y, z, xx, yy, zz)                                                \
     do {                                                                                           \
-        (p)[9] = (y) * (3.0f * (x) * (x) - (y) * (y));                                             \
+        (p)[9] = (y) * (3.0f * (xx) - (yy));                                                       \
         (p)[10] = (p)[4] * (z);                                                                    \
-        (p)[11] = (y) * (5.0f * (z) * (z) - (p)[0]);                                               \
-        (p)[12] = (z) * (5.0f * (z) * (z)-3.0f);                                                   \
-        (p)[13] = (x) * (5.0f * (z) * (z) - (p)[0]);                                               \
+        (p)[11] = (y) * (5.0f * (zz) - (p)[0]);                                                    \
+        (p)[12] = (z) * (5.0f * (zz)-3.0f);                                                        \
+        (p)[13] = (x) * (5.0f * (zz) - (p)[0]);                                                    \
         (p)[14] = (p)[8] * (z);                                                                    \
-        (p)[15] = (x) * ((x) * (x)-3.0f * (y) * (y));                                              \
+        (p)[15] = (x) * ((xx)-3.0f * (yy));                                                        \
         (p)[16] = (p)[4] * (p)[8];                                                                 \
         (p)[17] = (p)[9] * (z);                                                                    \
-        (p)[18] = (p)[4] * (7.0f * (z) * (z) - (p)[0]);                                            \
-        (p)[19] = (p)[5] * (7.0f * (z) * (z)-3.0f);                                                \
-        (p)[20] = (35.0f * (z) * (z)-30.0f) * (z) * (z) + 3.0f;                                    \
-        (p)[21] = (p)[7] * (7.0f * (z) * (z)-3.0f);                                                \
-        (p)[22] = (p)[8] * (7.0f * (z) * (z) - (p)[0]);                                            \
+        (p)[18] = (p)[4] * (7.0f * (zz) - (p)[0]);                                                 \
+        (p)[19] = (p)[5] * (7.0f * (zz)-3.0f);                                                     \
+        (p)[20] = (35.0f * (zz)-30.0f) * (zz) + 3.0f;                                              \
+        (p)[21] = (p)[7] * (7.0f * (zz)-3.0f);                                                     \
+        (p)[22] = (p)[8] * (7.0f * (zz) - (p)[0]);                                                 \
         (p)[23] = (p)[15] * (z);                                                                   \
         (p)[24] = (p)[15] * (x) - (p)[9] * (y);                                                    \
     } while (0)

@@ -33,13 +33,18 @@ struct block {
     vec light[3][BLOCK];
 };
 
-/*
- * Four texels: their solid angles, directions and light. The mean of a harmonic of band l over a
- * small texel of solid angle w is (1 - l(l+1) w / 24) of its value in the middle: the first term of
- * the texel's own extent.
- */
-static void add_texels(const float *solid_angle, const float *direction, const float *light,
-                       int order, struct block *block)
+/* The mean of a harmonic of band l over a small texel of solid angle w is (1 - l(l+1) w / 24) of its
+ * value in the middle: the first term of the texel's own extent. */
+static inline void add_band(const vec *p, vec w, int l, struct block *block)
+{
+    const vec weight = w * (1.0f - w * ((float)(l * (l + 1)) / 24.0f));
+    for (int k = l * l; k < (l + 1) * (l + 1); k++)
+        block->p[k][block->n] = p[k] * weight;
+}
+
+/* Four texels: their solid angles, directions and light. */
+static inline void add_texels(const float *solid_angle, const float *direction, const float *light,
+                              int order, struct block *block)
 {
     const vec w = gn_vec4_load(solid_angle), one = {1, 1, 1, 1};
     if (!(w[0] + w[1] + w[2] + w[3] > 0))
@@ -47,13 +52,16 @@ static void add_texels(const float *solid_angle, const float *direction, const f
     vec d[3], rgb[3], p[GN_SH_MAX];
     gn_vec4_split(direction, d);
     gn_vec4_split(light, rgb);
-    GN_SH_POLYNOMIALS_2(p, one, d[0], d[1], d[2]);
+    const vec xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
+    GN_SH_POLYNOMIALS_2(p, one, d[0], d[1], d[2], xx, yy, zz);
     if (order > 2)
-        GN_SH_POLYNOMIALS_4(p, d[0], d[1], d[2]);
-    for (int l = 0; l <= order; l++) {
-        vec weight = w * (1.0f - w * ((float)(l * (l + 1)) / 24.0f));
-        for (int k = l * l; k < (l + 1) * (l + 1); k++)
-            block->p[k][block->n] = p[k] * weight;
+        GN_SH_POLYNOMIALS_4(p, d[0], d[1], d[2], xx, yy, zz);
+    add_band(p, w, 0, block);
+    add_band(p, w, 1, block);
+    add_band(p, w, 2, block);
+    if (order > 2) {
+        add_band(p, w, 3, block);
+        add_band(p, w, 4, block);
     }
     for (int c = 0; c < 3; c++)
         block->light[c][block->n] = rgb[c];
@@ -95,7 +103,9 @@ static void add_block(const struct block *block, int order, struct gn_sh_sums *s
         add_pair(block, k, k + 1 < n ? k + 1 : k, sums);
 }
 
-static void add_row(const struct gn_radiance_map *map, int y, int order, struct gn_sh_sums *sums)
+/* order: a number known at the call, for which the compiler unrolls all. */
+static inline void add_row(const struct gn_radiance_map *map, int y, int order,
+                           struct gn_sh_sums *sums)
 {
     int width = map->radiance.width, whole = width - width % LANES;
     size_t start = (size_t)y * (size_t)width;
@@ -131,8 +141,10 @@ static void project_item(void *context, int item, int worker)
     for (int y = first; y < end && y < image->height; y++) {
         if (work->columns)
             gn_sh_add_latlong_row(image, y, work->order, work->columns, &sums);
+        else if (work->order == 2)
+            add_row(work->map, y, 2, &sums);
         else
-            add_row(work->map, y, work->order, &sums);
+            add_row(work->map, y, 4, &sums);
     }
     work->items[item] = sums;
 }

@@ -9,6 +9,7 @@
 
 #include <stdbool.h>
 
+#include "proto/attr.h"
 #include "server/light/radiance_map.h"
 
 /** Overlapping round windows over the whole sphere. */
@@ -27,9 +28,18 @@ struct gn_change {
 /** Adds light of that luminance, W/m^2, from a unit direction to the sums. */
 void gn_change_add(double sums[static GN_CHANGE_SUMS], const double dir[static 3],
                    double luminance);
+/** What of the windows depends on a map's table only: which of its patches lie in which. */
+struct gn_change_windows;
+/** Of a table that has all else but them. Returns 0 or -ENOMEM; *out_windows is NULL then. */
+GN_MUST_USE int gn_change_windows_create(const struct gn_map_table *table,
+                                         struct gn_change_windows **out_windows);
+/** NULL-safe; nulls *windows. */
+void gn_change_windows_destroy(struct gn_change_windows **windows);
+
 /**
- * The sums of a map's light, its fill included. Of the map alone, so that they do not depend on
- * what else is made of it; in patches of 1/48 of its longer side, W/m^2 of luminance.
+ * The sums of the light of a map that was made from a frame, its fill included. Of the map alone,
+ * so that they do not depend on what else is made of it; in patches (server/light/map_table.h) of
+ * about 1/48 of its longer side, W/m^2 of luminance.
  */
 void gn_change_measure(const struct gn_radiance_map *map, double out_sums[static GN_CHANGE_SUMS]);
 /**

@@ -462,6 +462,47 @@ static void knows_nothing_of_what_is_left_out(void **test)
     }
 }
 
+/* Summed while the map is made, patch by patch, and yet those of its texels one by one. */
+static void sums_are_those_of_the_texels(void **test)
+{
+    (void)test;
+    static const struct {
+        enum gn_projection_type type;
+        int width, height;
+        double tolerance; // a lamp counts from the middle of its patch; patches may be texels
+    } cases[] = {{GN_PROJECTION_FISHEYE_EQUIDISTANT, 301, 301, 0.03},
+                 {GN_PROJECTION_LATLONG, 300, 150, 0.03},
+                 {GN_PROJECTION_LATLONG, 1000, 500, 0.03},
+                 {GN_PROJECTION_LATLONG, 48, 24, 1e-6},
+                 {GN_PROJECTION_OCTAHEDRAL, 40, 40, 1e-6}};
+    for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
+        struct light_fixture f;
+        struct gn_radiance_map *map;
+        struct gn_error error = {0};
+        double sums[GN_CHANGE_SUMS], expected[GN_CHANGE_SUMS] = {0};
+        assert_int_equal(light_fixture_init(&f, cases[k].type, cases[k].width, cases[k].height), 0);
+        light_fixture_fill(&f, light_fixture_room);
+        struct gn_radiance_map_options options = {.no_fill = true};
+        assert_int_equal(gn_radiance_map_create(&f.frame, &options, NULL, &map, &error), 0);
+        gn_change_measure(map, sums);
+        size_t n = (size_t)map->radiance.width * (size_t)map->radiance.height;
+        for (size_t i = 0; i < n; i++) {
+            const float *d = map->direction_world + 3 * i;
+            const double dir[3] = {(double)d[0], (double)d[1], (double)d[2]};
+            if (map->solid_angle[i] > 0)
+                gn_change_add(expected, dir,
+                              (double)map->solid_angle[i] *
+                                  gn_luminance(map->radiance.data + 3 * i));
+        }
+        double all = expected[GN_CHANGE_WINDOWS];
+        assert_near(sums[GN_CHANGE_WINDOWS], all, 1e-6 * all);
+        for (int i = 0; i < GN_CHANGE_WINDOWS; i++)
+            assert_near(sums[i], expected[i], cases[k].tolerance * all);
+        gn_radiance_map_unref(&map);
+        light_fixture_finish(&f);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -482,6 +523,7 @@ int main(void)
         cmocka_unit_test(stays_black_where_it_is_black),
         cmocka_unit_test(follows_without_lights_too),
         cmocka_unit_test(knows_nothing_of_what_is_left_out),
+        cmocka_unit_test(sums_are_those_of_the_texels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
