@@ -251,7 +251,8 @@ static void add_texels(const struct gn_radiance_map *map, size_t first, size_t n
     float r = 0, g = 0, b = 0, x = 0, y = 0, z = 0, spread = 0;
     for (size_t i = 0; i < n; i++, l += 3, d += 3) {
         float w = weight[i], tr = l[0] * w, tg = l[1] * w, tb = l[2] * w;
-        float energy = 0.2126f * tr + 0.7152f * tg + 0.0722f * tb;
+        float energy =
+            (float)GN_LUMINANCE_R * tr + (float)GN_LUMINANCE_G * tg + (float)GN_LUMINANCE_B * tb;
         r += tr;
         g += tg;
         b += tb;
@@ -273,7 +274,7 @@ static void add_texels(const struct gn_radiance_map *map, size_t first, size_t n
 static void finish_cell(struct gn_grid_cell *cell)
 {
     const double *e = cell->irradiance;
-    cell->energy = 0.2126 * e[0] + 0.7152 * e[1] + 0.0722 * e[2];
+    cell->energy = GN_LUMINANCE_R * e[0] + GN_LUMINANCE_G * e[1] + GN_LUMINANCE_B * e[2];
     cell->own_spread /= 4 * pi;
 }
 
