@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "common/vec3.h"
+
 /* Of each face: where it looks, what is right, what is up. */
 static const double axes[GN_CUBE_FACES][3][3] = {
     {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}},  {{0, -1, 0}, {-1, 0, 0}, {0, 0, 1}},
@@ -18,24 +20,19 @@ void gn_cube_map_to_direction(int face, double s, double t, double out_dir[stati
         out_dir[i] = (axes[face][0][i] + s * axes[face][1][i] + t * axes[face][2][i]) / length;
 }
 
-static double dot(const double a[static 3], const double b[static 3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 int gn_cube_map_from_direction(const double dir[static 3], double out_st[static 2])
 {
     int face = 0;
-    double depth = dot(dir, axes[0][0]);
+    double depth = gn_vec3_dot(dir, axes[0][0]);
     for (int i = 1; i < GN_CUBE_FACES; i++) {
-        double d = dot(dir, axes[i][0]);
+        double d = gn_vec3_dot(dir, axes[i][0]);
         if (d > depth) {
             depth = d;
             face = i;
         }
     }
-    out_st[0] = dot(dir, axes[face][1]) / depth;
-    out_st[1] = dot(dir, axes[face][2]) / depth;
+    out_st[0] = gn_vec3_dot(dir, axes[face][1]) / depth;
+    out_st[1] = gn_vec3_dot(dir, axes[face][2]) / depth;
     return face;
 }
 

@@ -7,9 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/pose.h"
+#include "common/vec3.h"
 #include "server/light/emitters.h"
 #include "server/light/luminance.h"
+#include "server/light/piece_triangle.h"
 #include "server/scene/emission.h"
 
 /** Ways that triangles are sorted by. */
@@ -35,37 +36,6 @@ struct build {
     double (*frames)[9]; // [n_objects] rows: directions to cut across
 };
 
-static double dot(const double a[static 3], const double b[static 3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[static 3], const double b[static 3], double out[static 3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-/** Twice the area, along the normal. */
-static void get_area_vector(const struct gn_piece_triangle *t, double out[static 3])
-{
-    double u[3];
-    double v[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = t->corners[1][k] - t->corners[0][k];
-        v[k] = t->corners[2][k] - t->corners[0][k];
-    }
-    cross(u, v, out);
-}
-
-static double get_area(const struct gn_piece_triangle *t)
-{
-    double n[3];
-    get_area_vector(t, n);
-    return 0.5 * sqrt(dot(n, n));
-}
-
 static bool add_triangle(struct part *part, const struct gn_piece_triangle *triangle)
 {
     if (!(triangle->area > 0) || !isfinite(triangle->area))
@@ -83,34 +53,6 @@ static bool add_triangle(struct part *part, const struct gn_piece_triangle *tria
     return true;
 }
 
-/** A triangle of the mesh in world; rt keeps the outside where the matrix mirrors, and so do we. */
-static void get_triangle(const struct gn_scene_object *object, int index,
-                         struct gn_piece_triangle *out)
-{
-    const double *m = object->world_from_object;
-    double det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                 m[2] * (m[4] * m[9] - m[5] * m[8]);
-    double largest = 0;
-    double extent = 0;
-    memset(out, 0, sizeof(*out));
-    for (int i = 0; i < 3; i++) {
-        int corner = det < 0 ? 2 - i : i;
-        size_t vertex = object->mesh.triangles[3 * (size_t)index + (size_t)corner];
-        double p[3];
-        for (int k = 0; k < 3; k++)
-            p[k] = object->mesh.positions[3 * vertex + (size_t)k];
-        gn_mat4_transform_point(m, p, out->corners[i]);
-        for (size_t k = 0; k < 2 && object->mesh.uvs; k++)
-            out->uvs[i][k] = object->mesh.uvs[2 * vertex + k];
-    }
-    for (int i = 0; i < 9; i++) {
-        largest = fmax(largest, fabs(out->corners[i / 3][i % 3]));
-        extent = fmax(extent, fabs(out->corners[i / 3][i % 3] - out->corners[0][i % 3]));
-    }
-    out->area = get_area(out);
-    out->clearance = 0x1p-23 * (4 * largest + 16 * extent); // gn_rt_offset_origin
-}
-
 /** Directions to cut across: the middle side of the largest triangle (a rectangle's longer side),
  * the one across it, the normal. */
 static void make_frame(const struct gn_piece_triangle *t, double out[static 9])
@@ -121,7 +63,7 @@ static void make_frame(const struct gn_piece_triangle *t, double out[static 9])
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++)
             sides[i][k] = t->corners[(i + 1) % 3][k] - t->corners[i][k];
-        length[i] = sqrt(dot(sides[i], sides[i]));
+        length[i] = sqrt(gn_vec3_dot(sides[i], sides[i]));
     }
     int middle = 0;
     for (int i = 0; i < 3; i++) {
@@ -132,13 +74,13 @@ static void make_frame(const struct gn_piece_triangle *t, double out[static 9])
             break;
         }
     }
-    get_area_vector(t, normal);
-    double scale = sqrt(dot(normal, normal));
+    gn_piece_triangle_get_area_vector(t, normal);
+    double scale = sqrt(gn_vec3_dot(normal, normal));
     for (int k = 0; k < 3; k++) {
         out[k] = sides[middle][k] / length[middle];
         out[6 + k] = normal[k] / scale;
     }
-    cross(out + 6, out, out + 3);
+    gn_vec3_cross(out + 6, out, out + 3);
 }
 
 /** Which of the frame's six directions it faces. */
@@ -147,9 +89,9 @@ static int get_way(const struct gn_piece_triangle *t, const double frame[static 
     double normal[3];
     int way = 0;
     double best = -1;
-    get_area_vector(t, normal);
+    gn_piece_triangle_get_area_vector(t, normal);
     for (int i = 2; i >= 0; i--) { // the largest triangle's own direction first
-        double c = dot(normal, frame + 3 * i);
+        double c = gn_vec3_dot(normal, frame + 3 * i);
         if (fabs(c) > best) {
             best = fabs(c);
             way = 2 * i + (c < 0);
@@ -189,7 +131,7 @@ static int add_object(struct build *build, uint32_t index, struct gn_error *out_
     int ret = 0;
     memset(ways, 0, sizeof(ways));
     for (int i = 0; i < object->mesh.n_triangles; i++) {
-        get_triangle(object, i, &triangle);
+        gn_piece_triangle_read(object, i, &triangle);
         if (triangle.area > largest.area && isfinite(triangle.area))
             largest = triangle;
     }
@@ -197,7 +139,7 @@ static int add_object(struct build *build, uint32_t index, struct gn_error *out_
         return 0; // its world size rounds to nothing
     make_frame(&largest, build->frames[index]);
     for (int i = 0; i < object->mesh.n_triangles && ret == 0; i++) {
-        get_triangle(object, i, &triangle);
+        gn_piece_triangle_read(object, i, &triangle);
         if (!add_triangle(&ways[get_way(&triangle, build->frames[index])], &triangle))
             ret = gn_error_set(out_error, -ENOMEM, "near light: out of memory");
     }
@@ -216,24 +158,6 @@ static int add_object(struct build *build, uint32_t index, struct gn_error *out_
     return ret;
 }
 
-/** Share of a triangle below the plane at t, by its corners' heights. */
-static double get_share(const struct gn_piece_triangle *triangle, const double axis[static 3],
-                        double t)
-{
-    double s[3];
-    for (int i = 0; i < 3; i++)
-        s[i] = dot(triangle->corners[i], axis);
-    double a = fmin(s[0], fmin(s[1], s[2]));
-    double c = fmax(s[0], fmax(s[1], s[2]));
-    double b = fmax(fmin(s[0], s[1]), fmin(fmax(s[0], s[1]), s[2]));
-    if (t <= a)
-        return 0;
-    if (t >= c)
-        return 1;
-    return t < b ? (t - a) * (t - a) / ((b - a) * (c - a))
-                 : 1 - (c - t) * (c - t) / ((c - b) * (c - a));
-}
-
 /** The plane that halves the part's area. */
 static double find_median(const struct part *part, const double axis[static 3], double lo,
                           double hi)
@@ -241,8 +165,12 @@ static double find_median(const struct part *part, const double axis[static 3], 
     for (int step = 0; step < MEDIAN_STEPS; step++) {
         double t = 0.5 * (lo + hi);
         double below = 0;
-        for (int i = 0; i < part->n; i++)
-            below += part->triangles[i].area * get_share(&part->triangles[i], axis, t);
+        for (int i = 0; i < part->n; i++) {
+            double s[3];
+            for (int c = 0; c < 3; c++)
+                s[c] = gn_vec3_dot(part->triangles[i].corners[c], axis);
+            below += part->triangles[i].area * gn_piece_triangle_get_share(s, t);
+        }
         if (below < 0.5 * part->area)
             lo = t;
         else
@@ -251,44 +179,15 @@ static double find_median(const struct part *part, const double axis[static 3], 
     return 0.5 * (lo + hi);
 }
 
-/** Appends the triangle's part on one side of the plane (sign 1: below) as up to two triangles. */
+/** Appends the triangle's part on one side of the plane. */
 static bool add_clipped(struct part *part, const struct gn_piece_triangle *triangle,
                         const double height[static 3], double sign)
 {
-    struct corner {
-        double p[3], uv[2];
-    } out[4];
-    int n = 0;
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3;
-        double a = sign * height[i];
-        double b = sign * height[j];
-        if (a <= 0) {
-            memcpy(out[n].p, triangle->corners[i], sizeof(out[n].p));
-            memcpy(out[n++].uv, triangle->uvs[i], sizeof(out[n].uv));
-        }
-        if ((a < 0 && b > 0) || (a > 0 && b < 0)) {
-            double share = a / (a - b);
-            for (int k = 0; k < 3; k++)
-                out[n].p[k] = triangle->corners[i][k] +
-                              share * (triangle->corners[j][k] - triangle->corners[i][k]);
-            for (int k = 0; k < 2; k++)
-                out[n].uv[k] =
-                    triangle->uvs[i][k] + share * (triangle->uvs[j][k] - triangle->uvs[i][k]);
-            n++;
-        }
-    }
-    for (int i = 1; i + 1 < n; i++) {
-        struct gn_piece_triangle t = {.clearance = triangle->clearance};
-        const int of[3] = {0, i, i + 1};
-        for (int c = 0; c < 3; c++) {
-            memcpy(t.corners[c], out[of[c]].p, sizeof(t.corners[c]));
-            memcpy(t.uvs[c], out[of[c]].uv, sizeof(t.uvs[c]));
-        }
-        t.area = get_area(&t);
-        if (!add_triangle(part, &t))
+    struct gn_piece_triangle clipped[2];
+    int n = gn_piece_triangle_clip(triangle, height, sign, clipped);
+    for (int i = 0; i < n; i++)
+        if (!add_triangle(part, &clipped[i]))
             return false;
-    }
     return true;
 }
 
@@ -301,7 +200,7 @@ static void find_longest(const struct part *part, const double **out_axis, doubl
         double lo = INFINITY;
         double hi = -INFINITY;
         for (int i = 0; i < 3 * part->n; i++) {
-            double s = dot(part->triangles[i / 3].corners[i % 3], axis);
+            double s = gn_vec3_dot(part->triangles[i / 3].corners[i % 3], axis);
             lo = fmin(lo, s);
             hi = fmax(hi, s);
         }
@@ -328,7 +227,7 @@ static int cut(struct build *build, int index)
     for (int i = 0; i < old.n && ok; i++) {
         double height[3];
         for (int c = 0; c < 3; c++)
-            height[c] = dot(old.triangles[i].corners[c], axis) - t;
+            height[c] = gn_vec3_dot(old.triangles[i].corners[c], axis) - t;
         ok = add_clipped(&halves[0], &old.triangles[i], height, 1) &&
              add_clipped(&halves[1], &old.triangles[i], height, -1);
     }
@@ -373,11 +272,11 @@ static void fill_normal(const struct gn_pieces *pieces, struct gn_piece *piece)
     double sum[3] = {0};
     for (int i = 0; i < piece->n; i++) {
         double n[3];
-        get_area_vector(&pieces->triangles[piece->first + i], n);
+        gn_piece_triangle_get_area_vector(&pieces->triangles[piece->first + i], n);
         for (int k = 0; k < 3; k++)
             sum[k] += n[k];
     }
-    double length = sqrt(dot(sum, sum));
+    double length = sqrt(gn_vec3_dot(sum, sum));
     for (int k = 0; k < 3; k++)
         piece->normal[k] = sum[k] / length;
 }
@@ -451,64 +350,6 @@ void gn_pieces_finish(struct gn_pieces *pieces)
     memset(pieces, 0, sizeof(*pieces));
 }
 
-/** Nearest point of a segment to p, squared distance. */
-static double get_nearest_on_side(const double a[static 3], const double b[static 3],
-                                  const double p[static 3], double out[static 3])
-{
-    double along[3];
-    double to[3];
-    for (int k = 0; k < 3; k++) {
-        along[k] = b[k] - a[k];
-        to[k] = p[k] - a[k];
-    }
-    double length2 = dot(along, along);
-    double t = length2 > 0 ? fmin(fmax(dot(along, to) / length2, 0), 1) : 0;
-    double distance2 = 0;
-    for (int k = 0; k < 3; k++) {
-        out[k] = a[k] + t * along[k];
-        distance2 += (out[k] - p[k]) * (out[k] - p[k]);
-    }
-    return distance2;
-}
-
-/** Nearest point of a triangle: its plane's, where that lies inside, else a side's. */
-static double get_nearest_on_triangle(const struct gn_piece_triangle *t, const double p[static 3],
-                                      double out[static 3])
-{
-    const double(*c)[3] = t->corners;
-    double n[3];
-    double to[3];
-    bool is_inside = true;
-    get_area_vector(t, n);
-    double scale = dot(n, n);
-    for (int k = 0; k < 3; k++)
-        to[k] = p[k] - c[0][k];
-    double height = dot(n, to) / scale;
-    for (int k = 0; k < 3; k++)
-        out[k] = p[k] - height * n[k];
-    for (int i = 0; i < 3; i++) {
-        double side[3];
-        double from[3];
-        double outwards[3];
-        for (int k = 0; k < 3; k++) {
-            side[k] = c[(i + 1) % 3][k] - c[i][k];
-            from[k] = out[k] - c[i][k];
-        }
-        cross(side, n, outwards);
-        is_inside &= dot(outwards, from) <= 0;
-    }
-    double best = is_inside ? height * height * scale : INFINITY;
-    for (int i = 0; i < 3 && !is_inside; i++) {
-        double q[3];
-        double distance2 = get_nearest_on_side(c[i], c[(i + 1) % 3], p, q);
-        if (distance2 < best) {
-            best = distance2;
-            memcpy(out, q, sizeof(q));
-        }
-    }
-    return best;
-}
-
 void gn_piece_get_nearest(const struct gn_pieces *pieces, const struct gn_piece *piece,
                           const double p[static 3], double out_point[static 3])
 {
@@ -518,7 +359,7 @@ void gn_piece_get_nearest(const struct gn_pieces *pieces, const struct gn_piece 
     for (int i = 0; i < piece->n; i++) {
         const struct gn_piece_triangle *t = &pieces->triangles[piece->first + i];
         double q[3];
-        double distance2 = get_nearest_on_triangle(t, p, q);
+        double distance2 = gn_piece_triangle_get_nearest(t, p, q);
         if (distance2 < best) {
             best = distance2;
             nearest = t;
@@ -526,7 +367,7 @@ void gn_piece_get_nearest(const struct gn_pieces *pieces, const struct gn_piece 
         }
     }
     double n[3];
-    get_area_vector(nearest, n);
+    gn_piece_triangle_get_area_vector(nearest, n);
     for (int k = 0; k < 3; k++)
         out_point[k] += nearest->clearance * n[k] / (2 * nearest->area);
 }

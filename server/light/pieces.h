@@ -8,15 +8,8 @@
 
 #include "common/error.h"
 #include "proto/attr.h"
+#include "server/light/piece_triangle.h"
 #include "server/scene/scene.h"
-
-/** A part of a mesh's triangle. */
-struct gn_piece_triangle {
-    double corners[3][3]; // m, world; counter-clockwise seen from where it sends light
-    double uvs[3][2];
-    double area;      // m^2, > 0
-    double clearance; // m, of the mesh's whole triangle, as gn_rt_hit's
-};
 
 /** Neighbouring triangles that face about the same way. */
 struct gn_piece {
