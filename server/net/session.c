@@ -11,6 +11,7 @@
 
 #include "common/log.h"
 #include "server/net/hello.h"
+#include "server/net/session_notes.h"
 
 GN_LOG_TOPIC("net");
 
@@ -22,8 +23,7 @@ GN_LOG_TOPIC("net");
  * the outbox's room would cost the session, and memory without bound before that. */
 #define READ_MESSAGES 32
 
-/** For lines that a peer can cause; who comes and goes does not hide who misbehaves. */
-static struct gn_log_limiter limiter;
+/** Who comes and goes does not hide who misbehaves. */
 static struct gn_log_limiter arrivals = {.burst = 50, .interval_ns = 10 * GN_NS_PER_S};
 
 enum gn_session_action gn_session_get_action(enum gn_session_state state, enum gn_msg_role role,
@@ -87,105 +87,10 @@ void gn_session_destroy(struct gn_session **session)
     *session = NULL;
 }
 
-/** Nothing is read any more; what waits is written, then the connection ends. */
-static void start_closing(struct gn_session *s, int64_t now_ns)
-{
-    gn_room_leave(&s->member);
-    s->state = GN_SESSION_CLOSING;
-    s->deadline_ns = now_ns + GN_SESSION_LINGER_NS;
-    gn_session_write(s, now_ns);
-}
-
-static void put_note(struct gn_session *s, struct gn_note *note)
-{
-    if (!gn_session_wants_write(s)) // until now there was nothing that the peer could have taken
-        s->moved_ns = gn_clock_get_monotonic_ns();
-    if (gn_outbox_put(&s->outbox, s->host->mailbox, note) == 0)
-        return;
-    gn_mailbox_recycle(s->host->mailbox, &note);
-    gn_log_limited(&limiter, GN_LOG_WARN, "%s: %d messages wait for a peer that reads none: closed",
-                   s->peer, GN_OUTBOX_MAX_MESSAGES);
-    s->host->figures->stalled++;
-    s->state = GN_SESSION_GONE;
-}
-
-void gn_session_take_note(struct gn_session *session, struct gn_note *note)
-{
-    if (session->state == GN_SESSION_OPEN)
-        put_note(session, note);
-    else
-        gn_mailbox_recycle(session->host->mailbox, &note);
-}
-
-/** A blank note, or NULL: then the session is gone, as nothing can be said. */
-static struct gn_note *get_note(struct gn_session *s)
-{
-    struct gn_note *note;
-    if (gn_mailbox_get_blank(s->host->mailbox, &note) == 0)
-        return note;
-    gn_log_limited(&limiter, GN_LOG_ERROR, "%s: out of memory: closed", s->peer);
-    s->state = GN_SESSION_GONE;
-    return NULL;
-}
-
-/** Says an ERROR after which the session goes on. */
-static void complain(struct gn_session *s, enum gn_msg_error_code code, uint16_t about_type,
-                     uint64_t about_id, const char *sentence)
-{
-    gn_log_limited(&limiter, GN_LOG_DEBUG, "%s: %s", s->peer, sentence);
-    struct gn_note *note = get_note(s);
-    if (!note)
-        return;
-    gn_note_set_error(note, code, about_type, about_id, sentence);
-    put_note(s, note);
-}
-
-void gn_session_fail(struct gn_session *session, enum gn_msg_error_code code, uint16_t about_type,
-                     uint64_t about_id, const char *sentence, int64_t now_ns)
-{
-    gn_log_limited(&limiter, GN_LOG_INFO, "%s: closed: %s", session->peer, sentence);
-    struct gn_note *note = get_note(session);
-    if (!note)
-        return;
-    gn_note_set_error(note, code, about_type, about_id, sentence);
-    note->body.error.fatal = true;
-    put_note(session, note);
-    if (session->state != GN_SESSION_GONE)
-        start_closing(session, now_ns);
-}
-
-void gn_session_bye(struct gn_session *session, enum gn_msg_bye_reason reason, const char *sentence,
-                    int64_t now_ns)
-{
-    if (session->state == GN_SESSION_GONE || session->state == GN_SESSION_CLOSING)
-        return;
-    struct gn_note *note = get_note(session);
-    if (!note)
-        return;
-    note->type = GN_WIRE_BYE;
-    note->body.bye.reason = reason;
-    gn_wire_set_string(note->body.bye.sentence, sizeof(note->body.bye.sentence), sentence);
-    put_note(session, note);
-    if (session->state != GN_SESSION_GONE)
-        start_closing(session, now_ns);
-}
-
-void gn_session_send_statistics(struct gn_session *session)
-{
-    if (session->state != GN_SESSION_OPEN || !session->want_statistics)
-        return;
-    struct gn_note *note = get_note(session);
-    if (!note)
-        return;
-    note->type = GN_WIRE_STATISTICS;
-    gn_room_get_statistics(session->room, &note->body.statistics);
-    put_note(session, note);
-}
-
 static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int64_t now_ns)
 {
     struct gn_hello_answer answer;
-    struct gn_note *note = get_note(s);
+    struct gn_note *note = gn_session_get_note(s);
     if (!note)
         return;
     int rc = gn_hello_answer(s->host, hello, s->peer, &answer, &note->body.welcome);
@@ -202,7 +107,7 @@ static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int6
     s->member = answer.member;
     s->want_statistics = hello->want_statistics;
     gn_conn_set_max_payload(s->conn, answer.max_payload_bytes);
-    put_note(s, note);
+    gn_session_put_note(s, note);
     gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: %s in room %s as %s", s->peer,
                    (unsigned long long)s->id, hello->client_name,
                    gn_room_get_options(s->room)->name,
@@ -213,14 +118,14 @@ static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int6
 
 static void answer_ping(struct gn_session *s, const struct gn_msg_ping *ping, int64_t now_ns)
 {
-    struct gn_note *note = get_note(s);
+    struct gn_note *note = gn_session_get_note(s);
     if (!note)
         return;
     note->type = GN_WIRE_PONG;
     note->body.pong.t1_ns = ping->t1_ns;
     note->body.pong.t2_ns = now_ns;
     note->body.pong.t3_ns = now_ns; // set again when it is written
-    put_note(s, note);
+    gn_session_put_note(s, note);
 }
 
 /** Deals with a message that an open session may send. */
@@ -248,9 +153,10 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
         break;
     case GN_WIRE_POSE:
         if (m->pose.object[0]) {
-            complain(s, GN_MSG_ERROR_CODE_UNSUPPORTED, type, 0,
-                     "POSE of an object: moving objects are not built yet; an empty name is the "
-                     "viewer's own camera");
+            gn_session_complain(
+                s, GN_MSG_ERROR_CODE_UNSUPPORTED, type, 0,
+                "POSE of an object: moving objects are not built yet; an empty name is the "
+                "viewer's own camera");
             return;
         }
         rc = gn_room_put_pose(s->member, &m->pose, &error);
@@ -267,8 +173,8 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
     else if (rc == -ENOMEM)
         gn_session_fail(s, GN_MSG_ERROR_CODE_INTERNAL, type, about_id, error.text, now_ns);
     else if (rc < 0)
-        complain(s, rc == -EUSERS ? GN_MSG_ERROR_CODE_FULL : GN_MSG_ERROR_CODE_BAD_VALUE, type,
-                 about_id, error.text);
+        gn_session_complain(s, rc == -EUSERS ? GN_MSG_ERROR_CODE_FULL : GN_MSG_ERROR_CODE_BAD_VALUE,
+                            type, about_id, error.text);
 }
 
 static void take_message(struct gn_session *s, const struct gn_conn_message *message,
@@ -388,8 +294,8 @@ static bool send_next(struct gn_session *s)
     size_t before = gn_conn_get_queued_bytes(s->conn);
     int rc = gn_conn_send(s->conn, note->type, &note->body, note->payload, &fault);
     if (rc < 0) // ours to mend: a figure that the wire does not take, or no memory
-        gn_log_limited(&limiter, GN_LOG_ERROR, "%s: session %llu: cannot send: %s: %s", s->peer,
-                       (unsigned long long)s->id, strerror(-rc), fault.text);
+        gn_log_limited(&gn_session_limiter, GN_LOG_ERROR, "%s: session %llu: cannot send: %s: %s",
+                       s->peer, (unsigned long long)s->id, strerror(-rc), fault.text);
     if (rc == -EDOM && note->type == GN_WIRE_RESULT) {
         gn_note_set_dropped(note, note->body.result.id, GN_MSG_DROP_REASON_INTERNAL,
                             "the result could not be written as a message");
@@ -456,7 +362,7 @@ void gn_session_check_time(struct gn_session *session, int64_t now_ns)
         session->state = GN_SESSION_GONE;
     } else if (session->state == GN_SESSION_OPEN && gn_session_wants_write(session) &&
                now_ns - session->moved_ns >= host->stall_timeout_ns) {
-        gn_log_limited(&limiter, GN_LOG_INFO, "%s: session %llu: reads nothing: closed",
+        gn_log_limited(&gn_session_limiter, GN_LOG_INFO, "%s: session %llu: reads nothing: closed",
                        session->peer, (unsigned long long)session->id);
         host->figures->stalled++;
         session->state = GN_SESSION_GONE;
@@ -465,13 +371,13 @@ void gn_session_check_time(struct gn_session *session, int64_t now_ns)
         if (silent_ns >= host->idle_timeout_ns) {
             time_out(session, "no whole message came in time: PING keeps a session open", now_ns);
         } else if (silent_ns >= host->idle_timeout_ns / 2 && session->pinged_ns == 0) {
-            struct gn_note *note = get_note(session);
+            struct gn_note *note = gn_session_get_note(session);
             if (!note)
                 return;
             session->pinged_ns = now_ns;
             note->type = GN_WIRE_PING;
             note->body.ping.t1_ns = now_ns;
-            put_note(session, note);
+            gn_session_put_note(session, note);
             gn_session_write(session, now_ns);
         }
     }
