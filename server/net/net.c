@@ -219,6 +219,13 @@ static void deliver_notes(struct gn_net *net)
     }
 }
 
+static void publish_figures(struct gn_net *net)
+{
+    gn_mutex_lock(&net->mu);
+    net->figures = net->counted;
+    gn_mutex_unlock(&net->mu);
+}
+
 static void start_stopping(struct gn_net *net, int64_t now_ns)
 {
     uint64_t count;
@@ -226,6 +233,7 @@ static void start_stopping(struct gn_net *net, int64_t now_ns)
         return;
     net->is_stopping = true;
     net->counted.is_serving = false;
+    publish_figures(net); // before any peer is told: it may ask whether we are ready
     net->accept_after_ns = 0;
     (void)epoll_ctl(net->epoll_fd, EPOLL_CTL_DEL, net->listen_fd, NULL);
     for (int i = 0; i < net->n_sessions; i++)
@@ -285,9 +293,7 @@ static void tend_sessions(struct gn_net *net, int64_t now_ns)
         (void)watch(net, EPOLL_CTL_MOD, net->listen_fd, EPOLLIN, &net->listen_fd);
     }
     net->counted.connections = net->n_sessions;
-    gn_mutex_lock(&net->mu);
-    net->figures = net->counted;
-    gn_mutex_unlock(&net->mu);
+    publish_figures(net);
 }
 
 /** Milliseconds until something is due; -1: nothing is. */
