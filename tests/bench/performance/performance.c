@@ -4,13 +4,14 @@
  * How fast the renderer is, beside peers in the same run. Wall times, medians after a warm-up;
  * writes CSV tables into the folder.
  */
+#include "tests/bench/performance/performance.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include "common/thread.h"
-#include "tests/bench/performance/performance.h"
 #include "tests/bench/timing.h"
 
 static const struct part {
