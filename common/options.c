@@ -228,6 +228,15 @@ bool gn_options_is_set(const struct gn_options *options, const char *section, co
     return get_value(options, section, name, key, &option)->text != NULL;
 }
 
+bool gn_options_is_default(const struct gn_options *options, const char *section, const char *name,
+                           const char *key)
+{
+    const struct gn_option *option = NULL;
+    const char *text = get_value(options, section, name, key, &option)->text;
+    return text == NULL ||
+           (option->default_value != NULL && strcmp(text, option->default_value) == 0);
+}
+
 bool gn_options_get_bool(const struct gn_options *options, const char *section, const char *name,
                          const char *key)
 {

@@ -108,6 +108,9 @@ GN_MUST_USE int gn_options_check(const struct gn_options *options, struct gn_err
  */
 bool gn_options_is_set(const struct gn_options *options, const char *section, const char *name,
                        const char *key);
+/** Whether it is unset or says what the table's default says. */
+bool gn_options_is_default(const struct gn_options *options, const char *section, const char *name,
+                           const char *key);
 bool gn_options_get_bool(const struct gn_options *options, const char *section, const char *name,
                          const char *key);
 int gn_options_get_int(const struct gn_options *options, const char *section, const char *name,

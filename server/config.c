@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "common/text.h"
+#include "server/light_options.h"
 
 /** The path as the server opens it. */
 static int get_scene_path(const struct gn_options *o, const char *room, char out[static 4096],
@@ -25,25 +26,15 @@ static int get_scene_path(const struct gn_options *o, const char *room, char out
     return 0;
 }
 
-static void get_light(const struct gn_options *o, const char *room, struct gn_light_options *out)
+static int get_light(const struct gn_options *o, const char *room, struct gn_light_options *out,
+                     struct gn_error *out_error)
 {
     *out = (struct gn_light_options){
         .method = (enum gn_light_method)gn_options_get_enum(o, "room", room, "light-method"),
         .n_lights = gn_options_get_int(o, "room", room, "lights"),
-        .rings = gn_options_get_int(o, "room", room, "light-rings"),
-        .sectors = gn_options_get_int(o, "room", room, "light-sectors"),
-        .max_ls = gn_options_get_int(o, "room", room, "light-max-ls"),
-        .n_samples = gn_options_get_int(o, "room", room, "light-samples"),
-        .metric = (enum gn_partition_metric)gn_options_get_enum(o, "room", room, "light-metric"),
-        .literal = gn_options_get_set(o, "room", room, "light-literal"),
-        .mended = gn_options_get_set(o, "room", room, "light-mended"),
-        .weights = (enum gn_light_weights)gn_options_get_enum(o, "room", room, "light-weights"),
-        .relaxed = gn_options_get_bool(o, "room", room, "light-relaxed"),
-        .irradiance = {.order = gn_options_get_enum(o, "room", room, "sh-order") == 0 ? 2 : 4,
-                       .dering = gn_options_get_bool(o, "room", room, "sh-dering"),
-                       .keep_lights = gn_options_get_bool(o, "room", room, "sh-keep-lights")},
         .smoothing = 1e-3 * gn_options_get_double(o, "room", room, "light-smoothing-ms"),
     };
+    return gn_light_options_read(o, "room", room, out, out_error);
 }
 
 int gn_config_get_room(const struct gn_options *options, int i, char out_scene_path[static 4096],
@@ -78,9 +69,10 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
         .max_environment_height = gn_options_get_int(o, "room", room, "max-environment-height"),
         .holdable_margin = gn_options_get_double(o, "room", room, "rate-margin"),
     };
-    get_light(o, room, &r.light);
-    *out_room = r;
-    return 0;
+    rc = get_light(o, room, &r.light, out_error);
+    if (rc == 0)
+        *out_room = r;
+    return rc;
 }
 
 int gn_config_get_net(const struct gn_options *options, struct gn_net_options *out_net,

@@ -95,6 +95,9 @@ static const struct gn_option table[] = {
      .help = "Moves importance samples by the correction table: laid out more evenly, but they "
              "move when the light changes. For light that stands still; gnomon-render, which sees "
              "one moment, has it on."},
+    {ROOM, .key = "light-discs", .type = GN_OPTION_BOOL, .default_value = "true",
+     .help = "Keeps small suns out of the method and whole, as discs (seed: never); false: they go "
+             "through the method."},
     {ROOM, .key = "light-smoothing-ms", .type = GN_OPTION_DOUBLE, .min = 0, .max = 10000,
      .default_value = "400",
      .help = "Time constant by which light at rest follows the environment frames, so that the "

@@ -180,13 +180,12 @@ int gn_partition_make_lights(const struct gn_light_input *input, struct gn_light
                              struct gn_light_figures *figures)
 {
     const struct gn_partition_plan *plan = input->plan;
-    unsigned sampled = GN_READ_SAMPLE_MEAN | GN_READ_SAMPLE_MAX | GN_READ_BRIGHTEST;
     struct gn_partition p = {.input = input,
                              .map = input->map,
                              .settings = input->settings,
                              .plan = plan,
                              .n_regions = plan->n_regions + plan->n_dark_cells,
-                             .needs_samples = (input->settings->literal & sampled) != 0};
+                             .needs_samples = (input->settings->literal & GN_READ_SAMPLED) != 0};
     figures->rings = plan->n_rings;
     figures->sectors = plan->division.sectors;
     figures->split_gain = 1;

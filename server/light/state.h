@@ -69,7 +69,8 @@ enum gn_partition_reading {
     GN_READ_PLAIN_SAMPLING = 1 << 8, // importance Y, not Y dOmega/dA
     GN_READ_SEED = (1 << 9) - 1,     // the paper's own
     GN_READ_BRIGHTEST_DIR = 1 << 9,  // between: the energy, from the brightest texel's direction
-    GN_READ_ALL = (1 << 10) - 1
+    GN_READ_ALL = (1 << 10) - 1,
+    GN_READ_SAMPLED = GN_READ_SAMPLE_MEAN | GN_READ_SAMPLE_MAX | GN_READ_BRIGHTEST, // need samples
 };
 /** Their names, by rising bit, as a list of choices. */
 #define GN_READ_NAMES                                                                              \

@@ -186,6 +186,20 @@ def test_qualities_and_methods_run():
             check(not any(math.isnan(v) for v in values), '%s: NaN in %s' % (options, name))
 
 
+def test_discs_can_be_left_to_the_method():
+    bright = bytes((200, 180, 160, 140))  # radiances of 2560 to 3200 over 0.5
+    row = b''.join(bright if x == 128 else bytes((128, 128, 128, 128)) for x in range(256))
+    grey = bytes((128, 128, 128, 128)) * 256
+    write('sun.hdr', b'#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 128 +X 256\n' + grey * 40 + row + grey * 87)
+    lights = []
+    for options in ([], ['--light-discs'], ['--no-light-discs']):
+        check_run('--light-method', 'median-cut', '--lights', '4', '--report', 'report.json', *options,
+                  env='sun.hdr')
+        with open('report.json', encoding='utf-8') as report:
+            lights.append(json.load(report)['lights'])
+    check(lights[0] == lights[1] > 4 and lights[2] == 4, lights)
+
+
 def test_rotation_turns_the_light():
     # Light from the map's +x half only; the rotation decides which side of the box's floor sees it.
     row = [bytes((128, 128, 128, 133)) if 7 <= x < 9 else bytes(4) for x in range(16)]
@@ -314,6 +328,22 @@ def list_bad():
     yield 'lights', ['--lights', '9999'], {}
     yield 'light-method', ['--light-method', 'magic'], {}
     yield "did you mean 'sample-mean'?", ['--light-literal', 'strict,sample-maen'], {}
+    for method, takers, options in (
+            ('quadtree', 'partition, seed and penrose do', ['--light-literal', 'strict']),
+            ('median-cut', 'partition, seed and penrose do', ['--light-mended', 'unclamped']),
+            ('variance', 'partition, seed and penrose do', ['--no-light-relaxed']),
+            ('penrose', 'partition and seed do', ['--light-rings', '4']),
+            ('penrose', 'partition and seed do', ['--light-sectors', '12']),
+            ('inversion', 'partition and seed do', ['--light-max-ls', '4']),
+            ('penrose', 'partition and seed do', ['--light-samples', '500']),
+            ('penrose', 'partition and seed do', ['--light-metric', 'twice']),
+            ('partition', 'penrose does', ['--light-weights', 'density']),
+            ('seed', 'variance, inversion and quadtree do', ['--lights', '64']),
+            ('penrose', 'plain-sampling and discard-dark', ['--light-literal', 'plain-sampling,midpoint']),
+            ('partition', 'log2 only', ['--lights', '9', '--light-metric', 'pow2']),
+            ('partition', 'light-literal has sample-mean', ['--light-samples', '500']),
+            ('partition', 'light-literal has sample-mean', ['--no-light-relaxed'])):
+        yield takers, ['--light-method', method] + options, {}
     yield '1024 regions', ['--light-rings', '64', '--light-sectors', '256'], {}
     yield 'bounces', ['--bounces', '17', '--quality', 'reference'], {}
     yield '--bounces is for --quality reference', ['--bounces', '2'], {}

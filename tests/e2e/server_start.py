@@ -41,6 +41,9 @@ def test_configuration():
     refuse(Room('lihgts = 4'), 'gnomond.conf:', 'lihgts', 'lights')
     refuse(Room('lights = many'), 'gnomond.conf:', 'lights', 'many')
     refuse(Room('lights = 0'), 'gnomond.conf:', 'lights', '4096')
+    refuse(Room('light-method = quadtree\nlight-weights = equal'), 'gnomond.conf:',
+           'light-weights = equal has no effect: the method quadtree does not take it; penrose does')
+    refuse(Room('light-method = seed\nlights = 9'), 'lights = 9', 'penrose, median-cut')
     refuse(Room('shading = phong'), 'shading', 'lights', 'irradiance')
     refuse(Room(server='max-connections = -3'), 'max-connections')
     refuse(Room('[roon x]'), 'roon')

@@ -91,6 +91,8 @@ static void test_defaults(void **unused)
     assert_int_equal(gn_options_get_bytes(o, "http", NULL, "memory"), 64 << 20);
     assert_false(gn_options_get_bool(o, NULL, NULL, "verbose"));
     assert_false(gn_options_is_set(o, "http", NULL, "listen"));
+    assert_true(gn_options_is_default(o, "http", NULL, "listen"));
+    assert_true(gn_options_is_default(o, "server", NULL, "max-sessions"));
     assert_null(gn_options_get_string(o, NULL, NULL, "config"));
     assert_string_equal(gn_options_get_source(o, "server", NULL, "listen"), "default");
     assert_int_equal(gn_options_get_name_count(o, "room"), 0);
@@ -143,6 +145,7 @@ static void test_precedence(void **unused)
         assert_int_equal(gn_options_get_name_count(o, "room"), 2);
         assert_string_equal(gn_options_get_string(o, "room", "demo", "scene"), "a dir/scene.json");
         assert_true(gn_options_get_double(o, "room", "demo", "gain") == 2.5);
+        assert_false(gn_options_is_default(o, "room", "demo", "gain"));
         assert_int_equal(gn_options_get_enum(o, "room", "demo", "quality"), 1);
         assert_int_equal(gn_options_get_enum(o, "room", "other", "quality"), 2);
         assert_false(gn_options_is_set(o, "room", "other", "gain"));
