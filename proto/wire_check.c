@@ -316,6 +316,10 @@ static int check_lighting(const struct gn_msg_lighting_state *m, uint32_t payloa
         return gn_wire_refuse(fault,
                               "LIGHTING_STATE: payload of %u bytes, but lights and map make %u",
                               payload_bytes, want);
+    for (size_t i = 0; i < m->discs_count; i++)
+        if (m->discs[i] >= m->light_count || (i > 0 && m->discs[i] <= m->discs[i - 1]))
+            return gn_wire_refuse(fault, "LIGHTING_STATE.discs[%zu]: %u, must rise and be below %u",
+                                  i, m->discs[i], m->light_count);
     return 0;
 }
 

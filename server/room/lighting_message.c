@@ -8,6 +8,7 @@
 
 #include "common/half.h"
 #include "common/projection.h"
+#include "proto/attr.h"
 
 #define MAP_BYTES ((size_t)GN_LIGHTING_MAP_WIDTH * GN_LIGHTING_MAP_HEIGHT * 3 * 2)
 
@@ -75,6 +76,9 @@ int gn_lighting_message_make(const struct gn_lighting_state *state, bool with_ma
         .light_count = (uint32_t)state->n_lights,
         .probe = state->stream,
     };
+    for (int i = 0; i < state->n_lights && body.discs_count < GN_ARRAY_LEN(body.discs); i++)
+        if (state->lights[i].is_disc)
+            body.discs[body.discs_count++] = (uint32_t)i;
     for (int i = 0; i < 3; i++)
         body.probe_position_m[i] = (float)state->map->world_from_probe.translation[i];
     for (int i = 0; state->has_sh && i < 27; i++)

@@ -110,6 +110,8 @@ def fill(message, extreme):
                     child.payload_offset = child.payload_length * (count - i)
         elif field.name == 'orientation':
             message.orientation.extend([0.5, -0.5, 0.5, -0.5] if extreme else [0.6, 0.0, -0.8, 0.0])
+        elif field.name == 'discs':
+            message.discs.extend([0, 4] if extreme else [2])  # of light_count
         elif repeated:
             getattr(message, field.name).extend(scalar(field, extreme) for _ in range(COUNTS[field.name]))
         else:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the Gnomon authors
 # SPDX-License-Identifier: ISC
 """Frames through a real daemon: each id once, in the right light, with a whole receipt."""
+import json
 import struct
 import sys
 import time
@@ -245,6 +246,27 @@ def test_environment_formats():
         assert len(texels) == 512 * 256 * 6 and texels[:6] == b'\x00\x3c' * 3
 
 
+def get_room(daemon):
+    return json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]
+
+
+def test_discs_are_told():
+    """A small sun is one of the lights, and the message says which; not where the room has none."""
+    half = struct.pack('<e', 0.5) * 3 * 256
+    sun = half[:6 * 128] + struct.pack('<e', 60000) * 3 + half[:6 * 127]
+    pixels = half * 40 + sun + half * 87
+    for discs in ('true', 'false'):
+        with Daemon(rooms=Room('light-discs = %s' % discs)) as daemon, \
+                probe(daemon, want_lighting_states=True) as light:
+            light_up(light, 1, width=256, height=128, pixels=pixels,
+                     pixel_format=pb.PIXEL_FORMAT_RGB_F16)
+            state, payload = light.expect(LIGHTING_STATE)
+            assert len(state.discs) == (1 if discs == 'true' else 0), state
+            for k in state.discs:
+                x, y, z, radius, *_ = struct.unpack_from('<8f', payload, 32 * k)
+                assert x > 0.8 and abs(y) < 0.03 and z > 0.5 and 0 < radius < 0.02, (x, y, z, radius)
+
+
 def test_statistics():
     with Daemon() as daemon, probe(daemon) as light, \
             Viewer(daemon, want_statistics=True) as viewer:
@@ -266,7 +288,6 @@ def test_statistics():
 
 def test_no_work_without_need():
     """Light is not made for a room where nobody wants it, and is made when somebody comes."""
-    import json
     with Daemon() as daemon, probe(daemon) as light:
         def get_light():
             return json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['light']
@@ -307,6 +328,6 @@ def test_shutdown():
 
 run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_each_id_once,
            test_one_outstanding_loses_nothing,
-           test_slow_reader, test_told_at_once, test_waiting_for_light, test_reasons,
+           test_slow_reader, test_told_at_once, test_discs_are_told, test_waiting_for_light, test_reasons,
            test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,
            test_shutdown])

@@ -320,6 +320,8 @@ static void test_values_out_of_range(void **state)
     EXPECT_REFUSED(LIGHTING_STATE, lighting_state, light_count = 16385, "light_count");
     EXPECT_REFUSED(LIGHTING_STATE, lighting_state, light_count = 1, "payload");
     EXPECT_REFUSED(LIGHTING_STATE, lighting_state, map_width = 0, "map");
+    EXPECT_REFUSED(LIGHTING_STATE, lighting_state, discs[1] = 2, "discs[1]");
+    EXPECT_REFUSED(LIGHTING_STATE, lighting_state, discs[1] = 0, "must rise");
     EXPECT_REFUSED(STATISTICS, statistics, holdable_fps = -1, "holdable_fps");
 }
 

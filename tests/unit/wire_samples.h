@@ -170,7 +170,7 @@ static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_mess
         return 0;
     case GN_WIRE_LIGHTING_STATE:
         m->lighting_state = (struct gn_msg_lighting_state){
-            "lab", "node", 5, 6, {0}, 2, 4, 2, 9, {-1, 0.5f, 2}, true};
+            "lab", "node", 5, 6, {0}, 2, 4, 2, 9, {-1, 0.5f, 2}, true, 2, {0, 1}};
         for (int i = 0; i < 27; i++)
             m->lighting_state.sh[i] = (float)(i - 13);
         return 2 * GN_LIGHT_RECORD_BYTES + 4 * 2 * 6;
