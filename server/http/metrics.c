@@ -197,8 +197,8 @@ static void put_rooms(FILE *out, const struct sample *samples, int n)
     }
     put_dropped(out, samples, n);
     put_head(out, "gnomon_frame_latency_seconds", "histogram",
-             "From a frame's last byte received to its result queued; frames that were asked to "
-             "wait for light are not counted.");
+             "From a frame's last byte received to its result queued; frames that waited for "
+             "light are not counted.");
     for (int i = 0; i < n; i++)
         put_histogram(out, "gnomon_frame_latency_seconds", samples[i].label,
                       &samples[i].figures.latency);

@@ -37,7 +37,8 @@ struct gn_room_figures {
     bool has_environment_waiting;     // one is unread: nobody in the room needs light
     struct gn_time_histogram latency; // from the last byte received to the answer posted
     struct gn_time_histogram busy;    // the render thread's time
-    double latency_p50_ms, latency_p90_ms, latency_p99_ms; // last 100 results; 0: none yet
+    // Of the last 100 results that did not wait for light, whoever they were for; 0: none yet.
+    double latency_p50_ms, latency_p90_ms, latency_p99_ms;
     double busy_p50_ms;
     double holdable_fps_room;   // frames/s at 640 x 480, all viewers together; 0: not measured
     double holdable_fps_viewer; // each one's share

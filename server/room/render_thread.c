@@ -96,8 +96,6 @@ static void count_result(struct gn_room *room, const struct turn *turn,
     struct gn_snapshot *snapshot =
         turn->is_looked_at ? make_snapshot(outcome, job->frame.id) : NULL;
     double latency_ms = (double)(gn_clock_get_monotonic_ns() - job->received_ns) * 1e-6;
-    // A frame that was asked to wait for light is not a slow frame.
-    bool has_waited = job->frame.lighting_wait_ms > 0;
 
     gn_mutex_lock(&room->mu);
     struct gn_room_figures *f = &room->figures;
@@ -106,7 +104,7 @@ static void count_result(struct gn_room *room, const struct turn *turn,
     gn_time_window_add(&room->busy_ms, outcome->busy_ms);
     if (job->frame.quality != GN_MSG_QUALITY_REFERENCE)
         gn_time_window_add(&room->vga_ms, outcome->vga_ms);
-    if (!has_waited) {
+    if (!job->has_waited) { // for light: that is not a slow frame
         gn_time_histogram_add(&f->latency, latency_ms);
         gn_time_window_add(&room->latency_ms, latency_ms);
     }

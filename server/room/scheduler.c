@@ -79,6 +79,7 @@ enum gn_scheduler_verdict gn_scheduler_take(struct gn_scheduler *scheduler, int6
         bool is_lit =
             light.is_there && !light.is_behind && light.sequence >= frame->lighting_min_sequence;
         if (!is_lit && now_ns < deadline_ns) {
+            s->job.has_waited = true;
             if (deadline_ns < first_deadline_ns)
                 first_deadline_ns = deadline_ns;
             continue;

@@ -25,6 +25,7 @@ struct gn_frame_job {
     struct gn_buf *payload;                   // may be NULL: no pictures
     struct gn_note *answer; // taken before the frame is: an accepted frame can always be answered
     int64_t received_ns;    // when its last byte was read
+    bool has_waited;        // gn_scheduler_take could have taken it but for its light
 };
 
 enum gn_scheduler_verdict {

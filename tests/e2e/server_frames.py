@@ -284,6 +284,15 @@ def test_statistics():
                 assert message.environment_frames_in == 1
                 seen += 1
         assert n == 1 and seen
+        # A frame that may wait but finds its light counts, also when its viewer has gone.
+        viewer.send_frame(lighting_min_sequence=1, lighting_wait_ms=60000)
+        while viewer.receive()[0] != RESULT:
+            assert time.monotonic() < deadline
+        viewer.close()
+        deadline = time.monotonic() + 60
+        while get_room(daemon)['viewers'] and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert get_room(daemon)['viewers'] == 0 < get_room(daemon)['latency_ms']['p50']
 
 
 def test_no_work_without_need():

@@ -111,6 +111,24 @@ static void test_wait(void **state)
     assert_int_equal(take(s, 201 * MS, lit(5), GN_SCHEDULER_RENDER), 3);
 }
 
+/* Whoever may wait but need not has not waited. */
+static void test_who_has_waited(void **state)
+{
+    struct gn_scheduler *s = *state;
+    struct gn_frame_job old, out;
+    int slot = gn_scheduler_add(s);
+    int64_t deadline_ns;
+    for (int i = 0; i < 2; i++) {
+        struct gn_frame_job job = make_job(1, 100 * MS, 5, 50);
+        (void)gn_scheduler_put(s, slot, &job, &old);
+        if (i == 1)
+            take(s, 101 * MS, lit(4), GN_SCHEDULER_NOTHING);
+        assert_int_equal(gn_scheduler_take(s, 110 * MS, lit(5), &out, &deadline_ns),
+                         GN_SCHEDULER_RENDER);
+        assert_int_equal(out.has_waited, i == 1);
+    }
+}
+
 /* Light that is about to be replaced is waited for as if there were none. */
 static void test_light_behind(void **state)
 {
@@ -161,6 +179,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_latest_wins, setup, teardown),
         cmocka_unit_test_setup_teardown(test_turns, setup, teardown),
         cmocka_unit_test_setup_teardown(test_wait, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_who_has_waited, setup, teardown),
         cmocka_unit_test_setup_teardown(test_light_behind, setup, teardown),
         cmocka_unit_test_setup_teardown(test_no_light, setup, teardown),
         cmocka_unit_test_setup_teardown(test_slots, setup, teardown),
