@@ -143,8 +143,8 @@ static const struct gn_option table[] = {
              "the paper. Frames of quality seed always use the codes."},
     {ROOM, .key = "match", .type = GN_OPTION_SET, .choices = GN_MATCH_NAMES,
      .default_value = "all",
-     .help = "What of their cameras virtual pixels are given; the rest counts as if nobody had said "
-             "it. docs/frames.md explains each."},
+     .help = "What of their cameras virtual pixels are given; the rest counts as if nobody had "
+             "said it. docs/frames.md explains each."},
     {ROOM, .key = "allow-reference", .type = GN_OPTION_BOOL, .default_value = "true",
      .help = "Renders frames that ask for reference quality. One can take minutes, and the room's "
              "other viewers wait for it."},

@@ -33,8 +33,8 @@ struct block {
     vec light[3][BLOCK];
 };
 
-/* The mean of a harmonic of band l over a small texel of solid angle w is (1 - l(l+1) w / 24) of its
- * value in the middle: the first term of the texel's own extent. */
+/* The mean of a harmonic of band l over a small texel of solid angle w is (1 - l(l+1) w / 24) of
+ * its value in the middle: the first term of the texel's own extent. */
 static inline void add_band(const vec *p, vec w, int l, struct block *block)
 {
     const vec weight = w * (1.0f - w * ((float)(l * (l + 1)) / 24.0f));

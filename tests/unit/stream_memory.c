@@ -53,7 +53,8 @@ static void a_warm_stream_takes_no_map(void **unused)
     for (int m = 0; m < GN_LIGHT_METHOD_COUNT; m++) {
         enum gn_light_method method = (enum gn_light_method)m;
         long room = get_bytes_per_frame(method, light_fixture_room, 0);
-        long sunny = get_bytes_per_frame(method, sunny_room, method == GN_LIGHT_PARTITION_SEED ? 0 : 1);
+        long sunny =
+            get_bytes_per_frame(method, sunny_room, method == GN_LIGHT_PARTITION_SEED ? 0 : 1);
         print_message("# %s: %ld and, with a sun, %ld bytes a frame\n",
                       gn_light_method_get_name(method), room, sunny);
         assert_true(room < 24L * WIDTH * HEIGHT);
