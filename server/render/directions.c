@@ -3,10 +3,6 @@
 /*
  * The map's directions in blocks of 16 neighbours and groups of 16 blocks, and conservative tests
  * of 16 boxes of directions at once. All loops are over 16 lanes, for the compiler to vectorise.
- *
- * A ray from the origin with a direction of the box D = [a, b] meets the box [lo, hi] only if there
- * is a t > 0 with t a <= hi and t b >= lo on each axis: six bounds of t. Where hi >= 0 the first is
- * t <= hi / a for a > 0, else none; where hi < 0 it is t >= hi / a for a < 0, else there is no t.
  */
 #include "server/render/internal.h"
 
@@ -15,11 +11,8 @@
 
 // Wider than the rounding of directions and of their products.
 #define WIDEN 1e-6f
-// In place of 1 / 0: times a length it is farther than FAR.
+// In place of 1 / 0: times a length it is farther than the kernel's FAR.
 #define HUGE_INVERSE 3e38f
-#define FAR 1e28f
-// m; a box's sides are no nearer to the origin, outwards, so that 0 times HUGE_INVERSE is none.
-#define NEAR 1e-15f
 
 static inline float min2(float a, float b)
 {
@@ -54,42 +47,9 @@ static unsigned pack(const int32_t flags[static LANES])
     return mask;
 }
 
-static void keep_below(float t[static LANES], float side, const float inverse[static LANES])
-{
-    for (int i = 0; i < LANES; i++)
-        t[i] = min2(t[i], side * inverse[i]);
-}
-
-static void keep_above(float t[static LANES], float side, const float inverse[static LANES])
-{
-    for (int i = 0; i < LANES; i++)
-        t[i] = max2(t[i], side * inverse[i]);
-}
-
 unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct box *box)
 {
-    float t0[LANES];
-    float t1[LANES];
-    int32_t flags[LANES];
-    for (int i = 0; i < LANES; i++) {
-        t0[i] = 0;
-        t1[i] = FAR;
-    }
-    for (int k = 0; k < 3; k++) {
-        float hi = box->max[k];
-        float lo = box->min[k];
-        if (hi >= 0)
-            keep_below(t1, max2(hi, NEAR), boxes->min_rises[k]);
-        else
-            keep_above(t0, hi, boxes->min_falls[k]);
-        if (lo <= 0)
-            keep_below(t1, min2(lo, -NEAR), boxes->max_falls[k]);
-        else
-            keep_above(t0, lo, boxes->max_rises[k]);
-    }
-    for (int i = 0; i < LANES; i++)
-        flags[i] = t0[i] <= t1[i] * (1 + 4e-6f);
-    return pack(flags);
+    return gn_kernels_get()->meet(boxes, box->min, box->max);
 }
 
 /** Bounds of n . d over each box. */

@@ -23,11 +23,6 @@ struct side {
     int cluster;
 };
 
-static double dot(const double a[static 3], const double b[static 3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static int compare_sides(const void *a, const void *b)
 {
     const struct side *x = a;
@@ -74,23 +69,6 @@ static void add_sides(const struct clusters *clusters, int c, struct side **next
     }
 }
 
-/** Unit normal of the plane of an edge and an apex, to the same side of every such edge's
- * direction; 0: they are in line. */
-static void set_normal(const float ends[static 6], const float apex[static 3], float out[static 3])
-{
-    double e[3];
-    double w[3];
-    for (int k = 0; k < 3; k++) {
-        e[k] = (double)ends[3 + k] - ends[k];
-        w[k] = (double)apex[k] - ends[k];
-    }
-    const double n[3] = {w[1] * e[2] - w[2] * e[1], w[2] * e[0] - w[0] * e[2],
-                         w[0] * e[1] - w[1] * e[0]};
-    double length = sqrt(dot(n, n));
-    for (int k = 0; k < 3; k++)
-        out[k] = length > 0 ? (float)(n[k] / length) : 0;
-}
-
 /** Edges from sides in order: two equal ones make one with two triangles. */
 static int pair_sides(const struct side *sides, int n, struct edge *out)
 {
@@ -102,8 +80,6 @@ static int pair_sides(const struct side *sides, int n, struct edge *out)
         memcpy(edge->ends, sides[i].ends, sizeof(edge->ends));
         memcpy(edge->apex[0], sides[i].apex, sizeof(edge->apex[0]));
         memcpy(edge->apex[1], sides[end - 1].apex, sizeof(edge->apex[1]));
-        for (int k = 0; k < 2; k++)
-            set_normal(edge->ends, edge->apex[k], edge->normal[k]);
         edge->has_two = end - i == 2;
         edge->cluster = sides[i].cluster;
     }
@@ -138,6 +114,11 @@ int gn_edges_make(struct clusters *clusters)
         cluster->n_edges++;
     }
     return 0;
+}
+
+static double dot(const double a[static 3], const double b[static 3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /** -1, 0, 1: the side of the plane that the apex lies on; 0: not sure. */

@@ -11,6 +11,7 @@
 #define GN_SERVER_RENDER_INTERNAL_H
 
 #include "server/light/blend.h"
+#include "server/render/kernels/kernels.h"
 #include "server/render/near.h"
 #include "server/render/render.h"
 
@@ -71,17 +72,6 @@ struct box {
     float min[3], max[3];
 };
 
-/** Boxes of 16 sets of unit directions, widened against rounding; an empty set's has no direction
- * in it, only 0. */
-struct direction_boxes {
-    _Alignas(64) float min[3][LANES];
-    _Alignas(64) float max[3][LANES];
-    _Alignas(64) float min_rises[3][LANES]; // 1 / min where it is > 0, else huge
-    _Alignas(64) float min_falls[3][LANES]; // 1 / min where it is < 0, else -huge
-    _Alignas(64) float max_rises[3][LANES];
-    _Alignas(64) float max_falls[3][LANES];
-};
-
 /** 16 blocks of 16 lights each, all near each other. */
 struct light_group {
     struct direction_boxes blocks;
@@ -135,8 +125,7 @@ struct cluster {
 struct edge {
     float ends[6];
     float apex[2][3];
-    float normal[2][3]; // unit, of the plane of both ends and an apex; 0: there is none
-    bool has_two;       // triangles; else one, or more than two, and apex says nothing
+    bool has_two; // triangles; else one, or more than two, and apex says nothing
     int cluster;
 };
 
@@ -184,7 +173,8 @@ struct feature {
     float color[3]; // its radiance, or the shadow factor
 };
 
-/** The diffuse real samples of a batch, in structure-of-arrays form and blocks of LANES. */
+/** Samples of a batch that distant light is summed for, in structure-of-arrays form and blocks of
+ * LANES. */
 struct receivers {
     int n, n_blocks;
     int sample[BATCH]; // index of the sample
@@ -202,6 +192,8 @@ struct scratch {
     struct sample samples[BATCH];
     int lit[BATCH]; // indices of samples that shading works on
     struct receivers receivers;
+    int16_t shadow_lights[GN_LIGHTS_MAX]; // those that virtual objects may hide from a receiver
+    int n_shadow_lights;
     uint16_t cut[BATCH / LANES][GN_LIGHTS_MAX];    // per block and light, bit i: virtual objects
     uint16_t hidden[BATCH / LANES][GN_LIGHTS_MAX]; // (real objects) hide it from lane i
     uint16_t near_cut[BATCH / LANES][GN_NEAR_LIGHTS_MAX]; // the same of near lights
@@ -237,6 +229,7 @@ struct tile_figures {
 struct frame {
     const struct gn_scene *scene;
     const struct gn_rt *rt;
+    const struct gn_kernels *kernels;
     const struct gn_camera *camera;
     struct gn_blend blend; // the lighting state and its others
     struct gn_render_options options;
@@ -330,6 +323,30 @@ void gn_shadow_weigh(const struct frame *frame, struct sample *sample);
 void gn_shadow_see_nothing(const struct frame *frame, struct sample *sample);
 /** Zeroes the sums. */
 void gn_shadow_clear(struct sample *sample);
+
+/* receivers.c: distant light at samples in blocks of LANES */
+
+void gn_receivers_begin(struct receivers *receivers);
+/** Adds samples[i], which sees a surface. */
+void gn_receivers_add(struct receivers *receivers, const struct sample *samples, int i,
+                      int n_probes);
+/** Fills the last block up with receivers that no light reaches. */
+void gn_receivers_end(struct receivers *receivers, int n_probes);
+/** Bit i: the block's lane i has the light above its horizon. */
+unsigned gn_receivers_get_lit(const struct frame *frame, const struct receivers *receivers,
+                              int block, const float dir[static 3]);
+/** Rays of a block's lanes to a light, in packets; marks hidden lanes in masks[block][light]. */
+void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int block, int light,
+                        unsigned lanes, enum gn_rt_set set, uint16_t (*masks)[GN_LIGHTS_MAX],
+                        uint64_t *rays);
+/** After the last of those. */
+void gn_receivers_flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
+                        uint16_t (*masks)[GN_LIGHTS_MAX], uint64_t *rays);
+/** Irradiance by even and odd lights that hidden[n lights] does not mark, and the part of it that
+ * cut[n lights] marks. */
+void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, int block,
+                      const uint16_t *hidden, const uint16_t *cut, bool unweighted,
+                      double out_open[static 2][3][LANES], double out_cut[static 2][3][LANES]);
 
 /* blockers.c */
 
@@ -469,6 +486,22 @@ bool gn_box_may_meet_from_box(const struct box *box, const struct box *from,
 static inline float dot3(const float a[static 3], const float b[static 3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void gn_render_lights_get_dir(const struct light_list *lights, int l,
+                                            float out_dir[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        out_dir[k] = lights->dir[k][l];
+}
+
+/** As fminf and fmaxf, which are calls. */
+static inline void grow_box(struct box *box, const float p[static 3])
+{
+    for (int k = 0; k < 3; k++) {
+        box->min[k] = p[k] < box->min[k] ? p[k] : box->min[k];
+        box->max[k] = p[k] > box->max[k] ? p[k] : box->max[k];
+    }
 }
 
 /** Which probe's light l is. */

@@ -33,8 +33,32 @@ void gn_layers_finish(struct gn_layers *layers)
     memset(layers, 0, sizeof(*layers));
 }
 
+/** Most pixels by far: one sample of what is real and loses no light. */
+static bool is_plain(const struct sample *s, int n)
+{
+    return n == 1 && s->kind != SAMPLE_VIRTUAL && !(s->lost[0] > 0) && !(s->lost[1] > 0) &&
+           !(s->lost[2] > 0);
+}
+
+static void resolve_plain(const struct frame *frame, int x, int y, const struct sample *s)
+{
+    float *rgba = gn_image_at(&frame->layers->virtual_rgba, x, y);
+    float *shadow = gn_image_at(&frame->layers->shadow, x, y);
+    float *added = gn_image_at(&frame->layers->added, x, y);
+    for (int k = 0; k < 3; k++) {
+        rgba[k] = 0;
+        shadow[k] = 1;
+        added[k] = (float)s->gain[k];
+    }
+    rgba[3] = 0;
+}
+
 void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sample *samples, int n)
 {
+    if (is_plain(samples, n)) {
+        resolve_plain(frame, x, y, samples);
+        return;
+    }
     int n_virtual = 0;
     double radiance[3] = {0};
     double base[3] = {0};

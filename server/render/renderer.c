@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/render/kernels/kernels.h"
 #include "server/render/silhouette.h"
 
 #define DEFAULT_PATHS 256
@@ -258,6 +259,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     }
     frame->scene = renderer->scene;
     frame->rt = renderer->scene->rt;
+    frame->kernels = gn_kernels_get();
     frame->rays = renderer->rays;
     frame->lights = &renderer->lights;
     frame->places = &renderer->places;

@@ -20,113 +20,6 @@
 
 #include "server/render/silhouette.h"
 
-static void grow_box(struct box *box, const float p[static 3])
-{
-    for (int k = 0; k < 3; k++) {
-        box->min[k] = fminf(box->min[k], p[k]);
-        box->max[k] = fmaxf(box->max[k], p[k]);
-    }
-}
-
-/** Arrays of the real samples; the last block is filled up with receivers that no light reaches. */
-static void gather_receivers(const struct sample *samples, int n, int n_probes, struct receivers *r)
-{
-    static const struct box empty = {{INFINITY, INFINITY, INFINITY},
-                                     {-INFINITY, -INFINITY, -INFINITY}};
-    r->n = 0;
-    r->box = empty;
-    for (int i = 0; i < n; i++) {
-        const struct sample *s = &samples[i];
-        if (!s->is_receiver)
-            continue;
-        int j = r->n++;
-        if (j % LANES == 0)
-            r->boxes[j / LANES] = empty;
-        r->sample[j] = i;
-        for (int k = 0; k < 3; k++) {
-            r->org[k][j] = s->org[k];
-            r->shading[k][j] = s->surface.normal_shading[k];
-            r->geometric[k][j] = s->surface.normal_geometric[k];
-        }
-        for (int p = 0; p < n_probes && n_probes > 1; p++)
-            r->weights[p][j] = s->weights[p];
-        grow_box(&r->boxes[j / LANES], s->org);
-        grow_box(&r->box, s->org);
-    }
-    r->n_blocks = (r->n + LANES - 1) / LANES;
-    for (int j = r->n; j < r->n_blocks * LANES; j++) {
-        for (int k = 0; k < 3; k++)
-            r->org[k][j] = r->shading[k][j] = r->geometric[k][j] = 0;
-        for (int p = 0; p < n_probes; p++)
-            r->weights[p][j] = 0;
-    }
-}
-
-/** surface_cosine() of a block's 16 receivers. */
-static void get_cosines(const struct receivers *r, int block, const float dir[static 3],
-                        float out[static LANES])
-{
-    const float *s[3];
-    const float *g[3];
-    for (int k = 0; k < 3; k++) {
-        s[k] = r->shading[k] + block * LANES;
-        g[k] = r->geometric[k] + block * LANES;
-    }
-    for (int i = 0; i < LANES; i++) {
-        float c = s[0][i] * dir[0] + s[1][i] * dir[1] + s[2][i] * dir[2];
-        float d = g[0][i] * dir[0] + g[1][i] * dir[1] + g[2][i] * dir[2];
-        c = d > 0 ? c : 0;
-        out[i] = c > 0 ? c : 0;
-    }
-}
-
-static void get_light_dir(const struct light_list *lights, int l, float out_dir[static 3])
-{
-    for (int k = 0; k < 3; k++)
-        out_dir[k] = lights->dir[k][l];
-}
-
-/** Traces the packet; marks hidden lanes in masks[block][light]. */
-static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
-                  uint16_t (*masks)[GN_LIGHTS_MAX], struct tile_figures *figures)
-{
-    int n;
-    uint32_t hidden = gn_packet_trace(frame, scratch, set, &n, &figures->rays_shadow);
-    if (set == GN_RT_REAL)
-        figures->n_rays_real += (uint64_t)n;
-    for (int lane = 0; lane < n; lane++) {
-        int j = scratch->lane_sample[lane];
-        if (hidden >> lane & 1)
-            masks[j / LANES][scratch->lane_light[lane]] |= (uint16_t)(1u << (j % LANES));
-    }
-}
-
-/** Rays of a block's lanes to one light. */
-static void trace_block(const struct frame *frame, struct scratch *scratch, int block, int light,
-                        const float dir[static 3], unsigned lanes, enum gn_rt_set set,
-                        uint16_t (*masks)[GN_LIGHTS_MAX], struct tile_figures *figures)
-{
-    const struct receivers *r = &scratch->receivers;
-    for (; lanes != 0; lanes &= lanes - 1) {
-        int j = block * LANES + __builtin_ctz(lanes);
-        const float org[3] = {r->org[0][j], r->org[1][j], r->org[2][j]};
-        if (gn_packet_add(scratch, org, dir, j, light, 0, INFINITY))
-            flush(frame, scratch, set, masks, figures);
-    }
-}
-
-/** Bit i: lane i is above the horizon of the light, and of `lanes`. */
-static unsigned get_lit_lanes(const struct receivers *r, int block, const float dir[static 3],
-                              unsigned lanes)
-{
-    float cosines[LANES];
-    unsigned lit = 0;
-    get_cosines(r, block, dir, cosines);
-    for (int i = 0; i < LANES; i++)
-        lit |= (unsigned)(cosines[i] > 0) << i;
-    return lit & lanes;
-}
-
 /** Do rays away from the light, from points of the box, surely miss the virtual objects? Then what
  * their lines meet is on the light's side. */
 static bool is_before_virtual(const struct frame *frame, const struct box *box,
@@ -144,15 +37,34 @@ static void cut_block(const struct frame *frame, struct scratch *scratch, int bl
     const struct silhouette *silhouette = &frame->virtual_silhouettes[light];
     unsigned dark;
     unsigned edge;
-    gn_silhouette_get_block(silhouette, r, block, &dark, &edge);
+    gn_silhouette_get_block(frame, silhouette, r, block, &dark, &edge);
     if ((dark | edge) == 0)
         return;
-    unsigned lanes = get_lit_lanes(r, block, dir, dark | edge);
+    unsigned lanes = gn_receivers_get_lit(frame, r, block, dir) & (dark | edge);
     if ((lanes & dark) != 0 && is_before_virtual(frame, &r->boxes[block], dir)) {
         scratch->cut[block][light] |= (uint16_t)(lanes & dark);
         lanes &= ~dark;
     }
-    trace_block(frame, scratch, block, light, dir, lanes, GN_RT_VIRTUAL, scratch->cut, figures);
+    gn_receivers_trace(frame, scratch, block, light, lanes, GN_RT_VIRTUAL, scratch->cut,
+                       &figures->rays_shadow);
+}
+
+/** Lists the lights that virtual objects may hide from a receiver. */
+static void list_lights(const struct frame *frame, struct scratch *scratch, int n)
+{
+    struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    scratch->n_shadow_lights = 0;
+    for (int i = 0; i < n; i++) {
+        if (scratch->samples[i].is_receiver)
+            grow_box(&box, scratch->samples[i].org);
+    }
+    if (box.min[0] > box.max[0])
+        return;
+    for (int l = 0; l < frame->lights->n; l++) {
+        if (!frame->virtual_silhouettes ||
+            gn_silhouette_get_box(&frame->virtual_silhouettes[l], &box) != SILHOUETTE_FREE)
+            scratch->shadow_lights[scratch->n_shadow_lights++] = (int16_t)l;
+    }
 }
 
 /** Which lights do virtual objects hide? */
@@ -161,22 +73,21 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
 {
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
-    for (int l = 0; l < lights->n; l++) {
+    for (int i = 0; i < scratch->n_shadow_lights; i++) {
+        int l = scratch->shadow_lights[i];
         float dir[3];
-        get_light_dir(lights, l, dir);
+        gn_render_lights_get_dir(lights, l, dir);
         const struct silhouette *s =
             frame->virtual_silhouettes ? &frame->virtual_silhouettes[l] : NULL;
-        if (s && gn_silhouette_get_box(s, &r->box) == SILHOUETTE_FREE)
-            continue;
         for (int b = 0; b < r->n_blocks; b++) {
             if (!s)
-                trace_block(frame, scratch, b, l, dir, get_lit_lanes(r, b, dir, 0xffff),
-                            GN_RT_VIRTUAL, scratch->cut, figures);
+                gn_receivers_trace(frame, scratch, b, l, gn_receivers_get_lit(frame, r, b, dir),
+                                   GN_RT_VIRTUAL, scratch->cut, &figures->rays_shadow);
             else if (gn_silhouette_get_box(s, &r->boxes[b]) != SILHOUETTE_FREE)
                 cut_block(frame, scratch, b, l, dir, figures);
         }
     }
-    flush(frame, scratch, GN_RT_VIRTUAL, scratch->cut, figures);
+    gn_receivers_flush(frame, scratch, GN_RT_VIRTUAL, scratch->cut, &figures->rays_shadow);
     for (int b = 0; b < r->n_blocks; b++) {
         unsigned any = 0;
         for (int l = 0; l < lights->n; l++)
@@ -216,7 +127,7 @@ static unsigned get_doubtful_lanes(const struct frame *frame, const struct scrat
             return 0xffff;
     }
     if (gn_silhouette_get_box(s, &r->boxes[block]) != SILHOUETTE_FREE)
-        gn_silhouette_get_block(s, r, block, &dark, &edge);
+        gn_silhouette_get_block(frame, s, r, block, &dark, &edge);
     return dark | edge;
 }
 
@@ -228,11 +139,12 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
     const struct receivers *r = &scratch->receivers;
     const struct box *boxes[MAX_BLOCKERS];
     int n_boxes = frame->real_silhouettes ? gn_blockers_list_above(frame, r, boxes) : 0;
+    uint64_t n_rays = 0;
     for (int l = 0; l < lights->n; l++) {
         const struct silhouette *s = frame->real_silhouettes ? &frame->real_silhouettes[l] : NULL;
         const struct box *flat[MAX_BLOCKERS];
         float dir[3];
-        get_light_dir(lights, l, dir);
+        gn_render_lights_get_dir(lights, l, dir);
         int n_flat = s ? list_flat(frame, boxes, n_boxes, &r->box, dir, flat) : 0;
         if (s && n_flat == 0 && gn_silhouette_get_box(s, &r->box) == SILHOUETTE_FREE)
             continue;
@@ -241,44 +153,23 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
             if (lanes != 0 && s)
                 lanes &= get_doubtful_lanes(frame, scratch, b, l, dir, flat, n_flat);
             if (lanes != 0)
-                trace_block(frame, scratch, b, l, dir, get_lit_lanes(r, b, dir, lanes), GN_RT_REAL,
-                            scratch->hidden, figures);
+                lanes &= gn_receivers_get_lit(frame, r, b, dir);
+            gn_receivers_trace(frame, scratch, b, l, lanes, GN_RT_REAL, scratch->hidden, &n_rays);
         }
     }
-    flush(frame, scratch, GN_RT_REAL, scratch->hidden, figures);
+    gn_receivers_flush(frame, scratch, GN_RT_REAL, scratch->hidden, &n_rays);
+    figures->rays_shadow += n_rays;
+    figures->n_rays_real += n_rays;
 }
 
 /** U and S of a block's receivers. */
 static void sum_block(const struct frame *frame, struct scratch *scratch, int block)
 {
-    const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
-    double open[2][3][LANES] = {{{0}}};
-    double cut[2][3][LANES] = {{{0}}};
-    for (int l = 0; l < lights->n; l++) {
-        float dir[3];
-        float w[LANES];
-        get_light_dir(lights, l, dir);
-        get_cosines(r, block, dir, w);
-        unsigned hidden = scratch->hidden[block][l];
-        unsigned is_cut = scratch->cut[block][l];
-        for (int i = 0; i < LANES && (hidden || frame->options.shadow_unweighted); i++)
-            w[i] = !(w[i] > 0) || (hidden >> i & 1)   ? 0
-                   : frame->options.shadow_unweighted ? 1
-                                                      : w[i];
-        for (int i = 0; i < LANES && frame->blend.n > 1; i++)
-            w[i] *= r->weights[get_probe(lights, l)][block * LANES + i];
-        for (int k = 0; k < 3; k++) {
-            double irradiance = lights->irradiance[k][l];
-            double *sum = open[l & 1][k];
-            for (int i = 0; i < LANES; i++)
-                sum[i] += irradiance * (double)w[i];
-            for (int i = 0; i < LANES && is_cut; i++) {
-                if (is_cut >> i & 1)
-                    cut[l & 1][k][i] += irradiance * (double)w[i];
-            }
-        }
-    }
+    double open[2][3][LANES];
+    double cut[2][3][LANES];
+    gn_receivers_sum(frame, scratch, block, scratch->hidden[block], scratch->cut[block],
+                     frame->options.shadow_unweighted, open, cut);
     for (int i = 0; i < LANES; i++) {
         if (!(r->wanted[block] >> i & 1))
             continue;
@@ -339,7 +230,15 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
     bool groups[BATCH];
     for (int i = 0; i < n; i++)
         gn_shadow_clear(&scratch->samples[i]);
-    gather_receivers(scratch->samples, n, frame->blend.n, r);
+    list_lights(frame, scratch, n);
+    if (scratch->n_shadow_lights == 0 && frame->near.n == 0)
+        return;
+    gn_receivers_begin(r);
+    for (int i = 0; i < n; i++) {
+        if (scratch->samples[i].is_receiver)
+            gn_receivers_add(r, scratch->samples, i, frame->blend.n);
+    }
+    gn_receivers_end(r, frame->blend.n);
     if (r->n == 0)
         return;
     for (int b = 0; b < r->n_blocks; b++) {

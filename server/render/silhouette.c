@@ -14,16 +14,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/render/kernels/kernels.h"
+
 #define SIDE SILHOUETTE_SIDE
 #define BORDER 2
-// A triangle seen so nearly edge-on may be seen from either side; single precision.
-#define EDGE_ON 2e-6f
 // Smaller regions are left to rays.
 #define MIN_CELLS 3
 // Of regions; the rest is left to rays.
 #define MAX_REGIONS 64
-// As far outside the cells as a receiver's place is told.
-#define FAR_CELL 1e6f
 
 /** A set's vertices in cells. */
 struct projected {
@@ -145,16 +143,22 @@ static void draw_segment(const float a[static 2], const float b[static 2],
     }
 }
 
-static int get_side(const float normal[static 3], const float dir[static 3])
-{
-    float x = dot3(normal, dir);
-    return (x > EDGE_ON) - (x < -EDGE_ON);
-}
-
 static void get_cell(const struct silhouette *s, const float p[static 3], float out[static 2])
 {
     for (int i = 0; i < 2; i++)
         out[i] = dot3(s->axis[i], p) + s->offset[i];
+}
+
+/** Side of the line through a and b that the apex lies on; 0: so near to it that rounding may say
+ * either. */
+static int get_side(const float a[static 2], const float b[static 2], const float apex[static 2],
+                    const float half[static 2])
+{
+    float e[2] = {b[0] - a[0], b[1] - a[1]};
+    float w[2] = {apex[0] - a[0], apex[1] - a[1]};
+    float x = e[0] * w[1] - e[1] * w[0];
+    float limit = half[0] * (fabsf(e[1]) + fabsf(w[1])) + half[1] * (fabsf(e[0]) + fabsf(w[0]));
+    return (x > limit) - (x < -limit);
 }
 
 static void draw_edges(const struct clusters *clusters, const struct cluster *cluster,
@@ -162,14 +166,16 @@ static void draw_edges(const struct clusters *clusters, const struct cluster *cl
 {
     for (int i = 0; i < cluster->n_edges; i++) {
         const struct edge *edge = &clusters->edges[cluster->first_edge + i];
-        float a[2];
-        float b[2];
-        if (edge->has_two &&
-            get_side(edge->normal[0], s->dir) * get_side(edge->normal[1], s->dir) < 0)
-            continue;
-        get_cell(s, edge->ends, a);
-        get_cell(s, edge->ends + 3, b);
-        draw_segment(a, b, half, s);
+        float ends[2][2];
+        float apex[2][2];
+        for (int j = 0; j < 2; j++) {
+            get_cell(s, edge->ends + 3 * j, ends[j]);
+            get_cell(s, edge->apex[j], apex[j]);
+        }
+        if (!edge->has_two ||
+            get_side(ends[0], ends[1], apex[0], half) * get_side(ends[0], ends[1], apex[1], half) >=
+                0)
+            draw_segment(ends[0], ends[1], half, s);
     }
 }
 
@@ -399,24 +405,18 @@ enum silhouette_state gn_silhouette_get_box(const struct silhouette *s, const st
     return all_dark == span ? SILHOUETTE_DARK : SILHOUETTE_EDGE;
 }
 
-void gn_silhouette_get_block(const struct silhouette *s, const struct receivers *r, int block,
-                             unsigned *out_dark, unsigned *out_edge)
+void gn_silhouette_get_block(const struct frame *frame, const struct silhouette *s,
+                             const struct receivers *r, int block, unsigned *out_dark,
+                             unsigned *out_edge)
 {
-    const float *p[3] = {r->org[0] + block * LANES, r->org[1] + block * LANES,
-                         r->org[2] + block * LANES};
+    const float *const p[3] = {r->org[0] + block * LANES, r->org[1] + block * LANES,
+                               r->org[2] + block * LANES};
     int32_t cell[2][LANES];
     unsigned dark = 0;
     unsigned edge = 0;
-    for (int i = 0; i < 2; i++) {
-        for (int lane = 0; lane < LANES; lane++) {
-            float x = s->axis[i][0] * p[0][lane] + s->axis[i][1] * p[1][lane] +
-                      s->axis[i][2] * p[2][lane] + s->offset[i];
-            x = x > -FAR_CELL ? x : -FAR_CELL;
-            x = x < FAR_CELL ? x : FAR_CELL;
-            // Cells below 0 round towards it, but those at the border are free all the same.
-            cell[i][lane] = (int32_t)x;
-        }
-    }
+    // Cells below 0 round towards it, but those at the border are free all the same.
+    for (int i = 0; i < 2; i++)
+        frame->kernels->get_cells(s->axis[i], s->offset[i], p, cell[i]);
     for (int lane = 0; lane < LANES; lane++) {
         unsigned x = (unsigned)cell[0][lane];
         unsigned y = (unsigned)cell[1][lane];

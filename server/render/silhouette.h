@@ -49,7 +49,8 @@ GN_MUST_USE int gn_silhouettes_make(struct silhouettes *silhouettes,
 /** Of all lines through points of the box. */
 enum silhouette_state gn_silhouette_get_box(const struct silhouette *s, const struct box *box);
 /** Of a block's 16 receivers. bits: of *out_dark, *out_edge; the others are free. */
-void gn_silhouette_get_block(const struct silhouette *s, const struct receivers *r, int block,
-                             unsigned *out_dark, unsigned *out_edge);
+void gn_silhouette_get_block(const struct frame *frame, const struct silhouette *s,
+                             const struct receivers *r, int block, unsigned *out_dark,
+                             unsigned *out_edge);
 
 #endif

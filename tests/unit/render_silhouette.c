@@ -27,8 +27,9 @@ struct bench {
     struct light_list lights;
     struct silhouettes silhouettes;
     float margin;
-    float size; // m, of the part of space that is tried
-    float at;   // its middle, on each axis
+    struct frame frame; // its kernels
+    float size;         // m, of the part of space that is tried
+    float at;           // its middle, on each axis
 };
 
 static void add_lights(struct bench *b, uint64_t *seed)
@@ -56,6 +57,7 @@ static void init(struct bench *b, uint64_t *seed)
 {
     gn_test_stage_commit(&b->stage, 2);
     assert_int_equal(gn_clusters_make(b->stage.scene, GN_RT_VIRTUAL, &b->clusters), 0);
+    b->frame.kernels = gn_kernels_get();
     b->margin = 1e-5f * (fabsf(b->at) + b->size);
     add_lights(b, seed);
     make(b);
@@ -106,7 +108,7 @@ static void check(const struct bench *b, uint64_t *seed, int n_states[static 3])
         unsigned edge;
         fill_block(b, seed, r, &box);
         enum silhouette_state of_all = gn_silhouette_get_box(s, &box);
-        gn_silhouette_get_block(s, r, 0, &dark, &edge);
+        gn_silhouette_get_block(&b->frame, s, r, 0, &dark, &edge);
         assert_int_equal(dark & edge, 0);
         assert_true(of_all != SILHOUETTE_FREE || (dark | edge) == 0);
         assert_true(of_all != SILHOUETTE_DARK || dark == 0xffff);

@@ -1,0 +1,215 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/* The kernels of each processor give the plain ones' bits; those are what their formulas say. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/render/internal.h"
+#include "tests/meshes.h"
+
+#define N_ROUNDS 3000
+#define MAX_LIGHTS 37
+
+/** Inputs of all kernels. */
+struct inputs {
+    float normals[6][LANES];
+    float points[3][LANES];
+    float dirs[3][MAX_LIGHTS], irradiance[3][MAX_LIGHTS];
+    uint16_t hidden[MAX_LIGHTS], cut[MAX_LIGHTS];
+    float weights[3][LANES];
+    int ends[3];
+    struct box box, directions[LANES];
+    struct direction_boxes boxes;
+};
+
+/** And outputs. */
+struct outputs {
+    float cosines[LANES];
+    unsigned lit, met;
+    double open[2][3][LANES], cut[2][3][LANES];
+    int32_t cells[LANES];
+};
+
+/** Mostly [-1, 1), at times nothing, tiny or huge. */
+static float draw(uint64_t *seed)
+{
+    static const float extremes[8] = {0, -0.0f, 1e-42f, -1e-38f, 1, -1, 1e9f, -3e30f};
+    uint64_t r = gn_test_random(seed);
+    return r % 16 == 0 ? extremes[r / 16 % 8] : 2 * (float)gn_test_random_unit(seed) - 1;
+}
+
+static uint16_t draw_mask(uint64_t *seed)
+{
+    uint64_t r = gn_test_random(seed);
+    return r % 4 == 0 ? 0 : r % 4 == 1 ? 0xffff : (uint16_t)(r >> 16);
+}
+
+static void draw_box(uint64_t *seed, struct box *box)
+{
+    for (int k = 0; k < 3; k++) {
+        float a = draw(seed);
+        float b = draw(seed);
+        box->min[k] = a < b ? a : b;
+        box->max[k] = a < b ? b : a;
+    }
+}
+
+static void fill(uint64_t *seed, struct inputs *in)
+{
+    for (int i = 0; i < 6 * LANES; i++)
+        in->normals[i / LANES][i % LANES] = draw(seed);
+    for (int i = 0; i < 3 * LANES; i++) {
+        in->points[i / LANES][i % LANES] = draw(seed);
+        in->weights[i / LANES][i % LANES] = fabsf(draw(seed));
+    }
+    for (int l = 0; l < MAX_LIGHTS; l++) {
+        for (int k = 0; k < 3; k++) {
+            in->dirs[k][l] = draw(seed);
+            in->irradiance[k][l] = fabsf(draw(seed));
+        }
+        in->hidden[l] = draw_mask(seed);
+        in->cut[l] = draw_mask(seed);
+    }
+    in->ends[0] = 5;
+    in->ends[1] = 5; // a part without lights
+    in->ends[2] = MAX_LIGHTS;
+    draw_box(seed, &in->box);
+    for (int i = 0; i < LANES; i++) {
+        draw_box(seed, &in->directions[i]);
+        gn_directions_set_box(&in->boxes, i, &in->directions[i]);
+    }
+}
+
+static struct gn_kernel_sum make_sum(const struct inputs *in, int round)
+{
+    struct gn_kernel_sum sum = {
+        .n = round % MAX_LIGHTS,
+        .hidden = in->hidden,
+        .cut = in->cut,
+        .unweighted = round / 2 % 2,
+        .n_parts = round % 2 ? 3 : 1,
+        .ends = in->ends,
+        .weights = in->weights[0],
+        .weights_stride = LANES,
+    };
+    for (int k = 0; k < 3; k++) {
+        sum.surfaces.shading[k] = in->normals[k];
+        sum.surfaces.geometric[k] = in->normals[3 + k];
+        sum.dir[k] = in->dirs[k];
+        sum.irradiance[k] = in->irradiance[k];
+    }
+    return sum;
+}
+
+static void run(const struct gn_kernels *kernels, const struct inputs *in, int round,
+                struct outputs *out)
+{
+    const struct gn_kernel_sum sum = make_sum(in, round);
+    const float *const p[3] = {in->points[0], in->points[1], in->points[2]};
+    const float dir[3] = {in->dirs[0][0], in->dirs[1][0], in->dirs[2][0]};
+    memset(out, 0, sizeof(*out));
+    kernels->get_cosines(&sum.surfaces, dir, out->cosines);
+    out->lit = kernels->get_lit(&sum.surfaces, dir);
+    out->met = kernels->meet(&in->boxes, in->box.min, in->box.max);
+    kernels->sum_lights(&sum, out->open, out->cut);
+    kernels->get_cells(dir, 32, p, out->cells);
+}
+
+static void test_same_bits(void **state)
+{
+    (void)state;
+    int n_kernels = 0;
+    while (gn_kernels_get_at(n_kernels))
+        print_message("# %s\n", gn_kernels_get_at(n_kernels++)->name);
+    assert_ptr_equal(gn_kernels_get(), gn_kernels_get_at(n_kernels - 1));
+    struct inputs *in = aligned_alloc(64, (sizeof(*in) + 63) / 64 * 64);
+    struct outputs plain;
+    struct outputs wide;
+    assert_non_null(in);
+    uint64_t seed = 21;
+    for (int round = 0; round < N_ROUNDS; round++) {
+        fill(&seed, in);
+        run(gn_kernels_get_at(0), in, round, &plain);
+        for (int i = 1; i < n_kernels; i++) {
+            run(gn_kernels_get_at(i), in, round, &wide);
+            assert_memory_equal(plain.cosines, wide.cosines, sizeof(plain.cosines));
+            assert_int_equal(plain.lit, wide.lit);
+            assert_int_equal(plain.met, wide.met);
+            assert_memory_equal(plain.open, wide.open, sizeof(plain.open));
+            assert_memory_equal(plain.cut, wide.cut, sizeof(plain.cut));
+            assert_memory_equal(plain.cells, wide.cells, sizeof(plain.cells));
+        }
+    }
+    free(in);
+}
+
+static bool is_same(double a, double b)
+{
+    return a == b || (isnan(a) && isnan(b)); // of infinite cosines
+}
+
+/** Lane by lane, as the formulas have it. */
+static void check_lane(const struct inputs *in, int round, const struct outputs *out, int i)
+{
+    const struct gn_kernel_sum sum = make_sum(in, round);
+    const float s[3] = {in->normals[0][i], in->normals[1][i], in->normals[2][i]};
+    const float g[3] = {in->normals[3][i], in->normals[4][i], in->normals[5][i]};
+    double open[2][3] = {{0}};
+    double cut[2][3] = {{0}};
+    for (int l = 0; l < sum.n; l++) {
+        const float dir[3] = {in->dirs[0][l], in->dirs[1][l], in->dirs[2][l]};
+        bool is_lit = dot3(s, dir) > 0 && dot3(g, dir) > 0;
+        float w = !is_lit || (in->hidden[l] >> i & 1) ? 0 : sum.unweighted ? 1 : dot3(s, dir);
+        if (sum.n_parts > 1)
+            w *= in->weights[l < 5 ? 0 : 2][i];
+        for (int k = 0; k < 3; k++) {
+            open[l & 1][k] += (double)in->irradiance[k][l] * (double)w;
+            cut[l & 1][k] += in->cut[l] >> i & 1 ? (double)in->irradiance[k][l] * (double)w : 0;
+        }
+    }
+    for (int k = 0; k < 6; k++) {
+        assert_true(is_same(open[k / 3][k % 3], out->open[k / 3][k % 3][i]));
+        assert_true(is_same(cut[k / 3][k % 3], out->cut[k / 3][k % 3][i]));
+    }
+    const float first[3] = {in->dirs[0][0], in->dirs[1][0], in->dirs[2][0]};
+    bool is_lit = dot3(s, first) > 0 && dot3(g, first) > 0;
+    assert_int_equal(out->lit >> i & 1, is_lit);
+    assert_true(out->cosines[i] == (is_lit ? dot3(s, first) : 0));
+    const float p[3] = {in->points[0][i], in->points[1][i], in->points[2][i]};
+    float cell = dot3(first, p) + 32;
+    if (fabsf(cell) < 1e5f)
+        assert_int_equal(out->cells[i], (int)cell);
+    else
+        assert_true(out->cells[i] < 0 || out->cells[i] > 64);
+}
+
+static void test_plain_ones_are_the_formulas(void **state)
+{
+    (void)state;
+    struct inputs *in = aligned_alloc(64, (sizeof(*in) + 63) / 64 * 64);
+    struct outputs out;
+    assert_non_null(in);
+    uint64_t seed = 22;
+    for (int round = 0; round < N_ROUNDS / 10; round++) {
+        fill(&seed, in);
+        run(gn_kernels_get_at(0), in, round, &out);
+        for (int i = 0; i < LANES; i++)
+            check_lane(in, round, &out, i);
+    }
+    free(in);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_same_bits),
+        cmocka_unit_test(test_plain_ones_are_the_formulas),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
