@@ -12,9 +12,10 @@
 /* Bounces and mirrors together. */
 #define MAX_VERTICES (GN_RIG_MAX_BOUNCES + 4)
 /* Pairs of random numbers: one for the pixel, two for each vertex; then, where there is near light,
- * one for the emitters and one for each lamp at each vertex. */
+ * one for the emitters and one for each lamp at each vertex; then one for the lens's blur. */
 #define NEAR_PAIRS (1 + 2 * MAX_VERTICES)
-#define MAX_PAIRS (NEAR_PAIRS + (1 + GN_RIG_MAX_LAMPS) * MAX_VERTICES)
+#define BLUR_PAIR (NEAR_PAIRS + (1 + GN_RIG_MAX_LAMPS) * MAX_VERTICES)
+#define MAX_PAIRS (BLUR_PAIR + 1)
 
 /* Rays to near light end this share of their length before it: they start a little off the surface,
  * so that they would run into an emitter seen edge-on. */
@@ -243,6 +244,19 @@ static void trace_path(const struct job *job, enum gn_rt_set set, struct draws *
     *out_path = path;
 }
 
+/* A point of the pixel, and off it by what the lens spreads (Box and Muller 1958). */
+static void get_place(const struct job *job, struct draws *draws, double out_xy[static 2])
+{
+    double uv[2];
+    get_pair(draws, 0, out_xy);
+    if (!(job->view->blur_px > 0))
+        return;
+    get_pair(draws, BLUR_PAIR, uv);
+    double radius = job->view->blur_px * sqrt(-2 * log(1 - uv[0]));
+    out_xy[0] += radius * cos(2 * GN_RIG_PI * uv[1]);
+    out_xy[1] += radius * sin(2 * GN_RIG_PI * uv[1]);
+}
+
 /* The mean of one batch of paths, for each picture. */
 static void render_batch(const struct job *job, struct draws *draws, int x, int y,
                          double out_means[static GN_RIG_PICTURES][3], double *io_covered)
@@ -255,7 +269,7 @@ static void render_batch(const struct job *job, struct draws *draws, int x, int 
         struct path truth, background;
         double within[2], dir[3];
         draws->index = (uint32_t)i;
-        get_pair(draws, 0, within);
+        get_place(job, draws, within);
         gn_rig_view_get_ray(job->view, x + within[0], y + within[1], dir);
         trace_path(job, GN_RT_ALL, draws, camera, dir, &truth);
         background = truth;

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "tests/rig/random.h"
 #include "tests/rig/vec.h"
 
 const double gn_rig_probe_position[3] = {0, 0, 0.3};
@@ -178,4 +179,17 @@ double gn_rig_encode_srgb8(double linear)
 {
     double v = linear > 0 ? fmin(1, linear) : 0;
     return 255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055);
+}
+
+void gn_rig_photograph(const float *linear, long n, const struct gn_rig_noise *noise, uint64_t seed,
+                       int frame, uint8_t *out_codes)
+{
+    const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
+    for (long i = 0; i < 3 * n; i++) {
+        uint32_t words[4];
+        gn_rig_philox((const uint32_t[4]){(uint32_t)i, (uint32_t)frame, 0, 0x70686f74}, key, words);
+        double x = linear[i], deviation = sqrt(noise->slope * x + noise->offset);
+        x += deviation * gn_rig_get_normal(words[0], words[1]);
+        out_codes[i] = (uint8_t)floor(gn_rig_encode_srgb8(x) + 0.5);
+    }
 }

@@ -10,6 +10,7 @@
 #define GN_TESTS_RIG_VIEW_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "common/image.h"
 #include "common/pool.h"
@@ -22,6 +23,12 @@ struct gn_rig_view {
     double fx, fy, cx, cy;        // px
     double distortion[5];         // k1, k2, p1, p2, k3 of Brown and Conrady, OpenCV's order
     double world_from_camera[16]; // rigid, row-major
+    double blur_px;               // deviation of a normal point spread, px; 0: none
+};
+
+/** What a sensor adds: the variance slope x + offset on linear values x, white at 1. */
+struct gn_rig_noise {
+    double slope, offset;
 };
 
 /** Unit world direction through picture position (x, y) px. */
@@ -68,6 +75,13 @@ struct gn_rig_log_sensor gn_rig_make_log_sensor(double mean, double highest);
 /** The 12-bit code, rounded and clamped; and back. */
 int gn_rig_encode_log12(const struct gn_rig_log_sensor *sensor, double radiance);
 double gn_rig_decode_log12(const struct gn_rig_log_sensor *sensor, double code);
+
+/**
+ * 8-bit sRGB codes of a picture of linear values, noise added before the curve: another frame,
+ * another noise. codes: [3 n], linear: [3 n].
+ */
+void gn_rig_photograph(const float *linear, long n, const struct gn_rig_noise *noise, uint64_t seed,
+                       int frame, uint8_t *out_codes);
 
 /** IEC 61966-2-1: linear to an 8-bit code, clamped, before rounding. */
 double gn_rig_encode_srgb8(double linear);
