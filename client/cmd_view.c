@@ -150,7 +150,10 @@ static int send_camera(struct view *v)
         .k3 = c->distortion[4],
         .has_response = true,
         .scale = c->response.scale,
+        .blur_px = c->match.blur_px,
     };
+    memcpy(message.noise_slope, c->match.noise_slope, sizeof(message.noise_slope));
+    memcpy(message.noise_offset, c->match.noise_offset, sizeof(message.noise_offset));
     gn_cmd_make_response(&c->response, &message.response);
     memcpy(message.matrix_to_rec709, c->response.to_rec709, sizeof(c->response.to_rec709));
     return gn_client_send_camera(v->replay.client, &message);

@@ -11,11 +11,12 @@
 #include <stdbool.h>
 
 #include "proto/attr.h"
+#include "proto/limits.h"
 
 struct gn_camera;
 
 /** Largest standard deviation of a point spread, px. */
-#define GN_MATCH_MAX_BLUR_PX 8.0
+#define GN_MATCH_MAX_BLUR_PX GN_LIMIT_BLUR_PX
 
 /**
  * Noise and blur. A value; all 0: none.

@@ -32,6 +32,8 @@
 #define GN_LIMIT_MAP_HEIGHT_PX 1024
 /** Views of a frame, and cameras of a session. */
 #define GN_LIMIT_VIEWS 4
+/** Pixels: largest standard deviation of a camera's point spread. */
+#define GN_LIMIT_BLUR_PX 8
 /** Entries of a response table. */
 #define GN_LIMIT_TABLE_ENTRIES 4096
 /** Milliseconds: longest time a frame may ask to be held for light. */

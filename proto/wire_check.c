@@ -209,6 +209,15 @@ static int check_camera(const struct gn_msg_camera *m, struct gn_wire_fault *fau
         if (fabs(k[i]) > MAX_COEFFICIENT)
             return gn_wire_refuse(fault, "CAMERA: distortion coefficient %d is %g, at most 1e6",
                                   i + 1, k[i]);
+    for (int i = 0; i < 3; i++)
+        if (!(m->noise_slope[i] >= 0 && m->noise_slope[i] <= 1 && m->noise_offset[i] >= 0 &&
+              m->noise_offset[i] <= 1))
+            return gn_wire_refuse(fault,
+                                  "CAMERA: noise_slope %g, noise_offset %g, must be in [0, 1]",
+                                  m->noise_slope[i], m->noise_offset[i]);
+    if (!(m->blur_px >= 0 && m->blur_px <= GN_LIMIT_BLUR_PX))
+        return gn_wire_refuse(fault, "CAMERA.blur_px: %g px, must be in [0, %d]", m->blur_px,
+                              GN_LIMIT_BLUR_PX);
     if (m->has_response)
         err = check_response(&m->response, false, "CAMERA.response", fault);
     return err ? err : check_colour(m->matrix_to_rec709, m->scale, "CAMERA", fault);
@@ -258,6 +267,8 @@ static int check_frame(const struct gn_msg_frame *m, uint32_t payload_bytes,
                               payload_bytes, fault);
         if (!err && v->has_world_from_camera)
             err = check_transform(&v->world_from_camera, "FRAME.views[].world_from_camera", fault);
+        if (!err)
+            err = check_colour(v->matrix_to_rec709, v->scale, "FRAME.views[]", fault);
         if (err)
             return err;
     }

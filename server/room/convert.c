@@ -69,8 +69,11 @@ int gn_convert_camera(const struct gn_msg_camera *message, struct gn_camera *out
         .cx = message->cx,
         .cy = message->cy,
         .distortion = {message->k1, message->k2, message->p1, message->p2, message->k3},
+        .match = {.blur_px = message->blur_px},
         .world_from_camera = {{1, 0, 0, 0}, {0, 0, 0}},
     };
+    memcpy(camera.match.noise_slope, message->noise_slope, sizeof(camera.match.noise_slope));
+    memcpy(camera.match.noise_offset, message->noise_offset, sizeof(camera.match.noise_offset));
     int rc = gn_convert_response(&message->response, message->matrix_to_rec709, message->scale,
                                  NULL, &camera.response, out_error);
     if (rc < 0)
@@ -79,6 +82,24 @@ int gn_convert_camera(const struct gn_msg_camera *message, struct gn_camera *out
     if (gn_camera_check(&camera, &reason) < 0)
         return gn_error_set(out_error, -EINVAL, "camera: %s", reason);
     *out_camera = camera;
+    return 0;
+}
+
+int gn_convert_view(const struct gn_msg_frame_view *view, struct gn_camera *camera,
+                    struct gn_error *out_error)
+{
+    struct gn_response response = camera->response;
+    bool has_matrix = false;
+    for (int i = 0; i < 9; i++)
+        has_matrix = has_matrix || view->matrix_to_rec709[i] != 0;
+    if (has_matrix)
+        memcpy(response.to_rec709, view->matrix_to_rec709, sizeof(response.to_rec709));
+    if (view->scale > 0)
+        response.scale = view->scale;
+    const char *reason = NULL;
+    if (gn_response_check(&response, &reason) < 0)
+        return gn_error_set(out_error, -EINVAL, "%s", reason);
+    camera->response = response;
     return 0;
 }
 

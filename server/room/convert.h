@@ -16,6 +16,10 @@
 /** Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_convert_camera(const struct gn_msg_camera *message, struct gn_camera *out_camera,
                                   struct gn_error *out_error);
+/** Gives the camera what the view says of its exposure and white balance. Returns 0, or -EINVAL and
+ * a sentence. */
+GN_MUST_USE int gn_convert_view(const struct gn_msg_frame_view *view, struct gn_camera *camera,
+                                struct gn_error *out_error);
 /** An absent transform is the identity. Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_convert_transform(bool is_there, const struct gn_msg_transform *message,
                                      struct gn_pose *out_pose, struct gn_error *out_error);

@@ -276,6 +276,11 @@ static enum gn_msg_drop_reason prepare_job(const struct gn_room_session *s,
             gn_convert_transform(true, &view->world_from_camera, &camera->world_from_camera,
                                  error) < 0)
             return GN_MSG_DROP_REASON_BAD_FRAME;
+        struct gn_error why = {0};
+        if (gn_convert_view(view, camera, &why) < 0) {
+            gn_error_set(error, -EINVAL, "view %zu: %s", i, why.text);
+            return GN_MSG_DROP_REASON_BAD_FRAME;
+        }
         gn_match_keep(GN_MATCH_ALL & ~s->room->options.unmatched, camera);
         size_t wanted = get_picture_bytes(camera, view->picture_format);
         if (wanted && wanted != view->payload_length) {

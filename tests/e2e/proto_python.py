@@ -46,6 +46,7 @@ FIXED = {
         pb.PIXEL_FORMAT_RGB8, pb.PIXEL_FORMAT_RGB_F16),
     'EnvironmentFrame.width': (5, 8192), 'EnvironmentFrame.height': (3, 2), 'Pose.confidence': (0.5, 1.0),
     'Camera.index': (2, 3), 'Camera.width': (640, 8192), 'Camera.height': (480, 8192),
+    'Camera.noise_slope': (1e-3, 1.0), 'Camera.noise_offset': (1e-6, 1.0), 'Camera.blur_px': (0.7, 8.0),
     'Frame.jpeg_quality': (85, 100), 'Frame.lighting_wait_ms': (250, 60000),
     'FrameView.camera': (1, 3), 'ResultView.width': (4, 4), 'ResultView.height': (2, 2),
     'ResultView.format': (pb.PICTURE_FORMAT_RGB8,) * 2, 'ResultView.payload_length': (24, 24),
@@ -53,7 +54,7 @@ FIXED = {
     'LightingState.light_count': (3, 5), 'LightingState.map_width': (4, 6),
     'LightingState.map_height': (2, 3),
 }
-COUNTS = {'orientation': 4, 'position_m': 3, 'matrix_to_rec709': 9, 'sh': 27,
+COUNTS = {'orientation': 4, 'position_m': 3, 'matrix_to_rec709': 9, 'noise_slope': 3, 'noise_offset': 3, 'sh': 27,
           'probe_position_m': 3}
 STRING_BYTES = {  # without the NUL of C
     'Hello.client_name': 63, 'Hello.client_version': 31, 'Hello.token': 255, 'Hello.room': 63,

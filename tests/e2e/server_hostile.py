@@ -108,6 +108,9 @@ def test_bad_frames():
                                            picture_format=pb.PICTURE_FORMAT_RGB8)]),
         pb.Frame(id=1, views=[pb.FrameView(world_from_camera=DOWN, payload_length=9,
                                            picture_format=pb.PICTURE_FORMAT_RGB8)] * 2),
+        pb.Frame(id=1, views=[pb.FrameView(world_from_camera=DOWN, scale=-1)]),
+        pb.Frame(id=1, views=[pb.FrameView(world_from_camera=DOWN, scale=nan)]),
+        pb.Frame(id=1, views=[pb.FrameView(world_from_camera=DOWN, matrix_to_rec709=[1e7] * 9)]),
     ]
     for message in bad:
         with Viewer(DAEMON) as viewer:
@@ -115,7 +118,9 @@ def test_bad_frames():
             error, _ = viewer.expect(ERROR)
             assert error.code in (pb.ERROR_CODE_BAD_VALUE, pb.ERROR_CODE_MALFORMED), error
     for fields in (dict(width=0), dict(height=0), dict(fx=0), dict(fy=-1), dict(cx=nan),
-                   dict(width=8193), dict(index=4), dict(k1=float('inf'))):
+                   dict(width=8193), dict(index=4), dict(k1=float('inf')),
+                   dict(blur_px=8.01), dict(blur_px=-1), dict(noise_slope=[0, -1e-9, 0]),
+                   dict(noise_offset=[0, 0, 1.5]), dict(noise_slope=[nan, 0, 0])):
         with Client(DAEMON, pb.ROLE_VIEWER) as client:
             client.send(CAMERA, camera(**fields))
             error, _ = client.expect(ERROR)

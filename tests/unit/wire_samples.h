@@ -146,7 +146,10 @@ static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_mess
                                            .has_response = true,
                                            .response = {GN_MSG_RESPONSE_TYPE_LOG, 1, -2, 3, 4, 0},
                                            .matrix_to_rec709 = {9, 8, 7, 6, 5, 4, 3, 2, 1},
-                                           .scale = 1e-300};
+                                           .scale = 1e-300,
+                                           .noise_slope = {0, 0.5, 1},
+                                           .noise_offset = {1, 1e-9, 0},
+                                           .blur_px = 8};
         return 0;
     case GN_WIRE_FRAME:
         m->frame = (struct gn_msg_frame){UINT64_MAX,
@@ -160,7 +163,8 @@ static inline uint32_t sample_message(enum gn_wire_type type, union gn_wire_mess
                                          GN_LIMIT_LIGHTING_WAIT_MS};
         for (uint32_t i = 0; i < 4; i++)
             m->frame.views[i] = (struct gn_msg_frame_view){
-                true, sample_transform, i, GN_MSG_PICTURE_FORMAT_RGB8, 3 * (3 - i), 3};
+                true,    sample_transform,           i, GN_MSG_PICTURE_FORMAT_RGB8, 3 * (3 - i), 3,
+                i * 0.5, {i, 8, 7, 6, 5, 4, 3, 2, 1}};
         return 12;
     case GN_WIRE_RESULT:
         sample_result(&m->result);
