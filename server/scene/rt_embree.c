@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 #include "server/scene/rt.h"
+#include "server/scene/rt_loop.h"
 
 #include <assert.h>
 #include <errno.h>
@@ -471,4 +472,9 @@ void gn_rt_offset_origin(const float point[static 3], const float normal[static 
     float step = side < 0.0f ? -clearance : clearance;
     for (int k = 0; k < 3; k++)
         out_org[k] = point[k] + step * normal[k];
+}
+
+void *gn_rt_get_tree(const struct gn_rt *rt, enum gn_rt_set set)
+{
+    return rt->scenes[set - 1];
 }

@@ -8,7 +8,6 @@ FOLDER holds the tables of error_time; plots.svg and plots.png files and page.md
 daemon's program: it is asked for its default method. With DOCS (the tree's docs folder) the page goes to
 DOCS/error.md and the SVG plots beside it. Needs gnuplot.
 """
-import math
 import os
 import re
 import shutil
@@ -18,24 +17,13 @@ import sys
 
 import tables
 from curves import UNKNOWN, Curves, geometric_mean
+from page import draw, get_commit, get_machine, number, table
 
 BUDGETS_MS = [16, 24, 32, 48, 64, 128]
 LEVELS = [0.05, 0.02, 0.01]
 PLOT_MAPS = ["lamps", "sun", "overcast", "rig"]
 BASE = "the paper's partition"
 LITERAL = "8x24 maxLS=8 2^k mean of samples"
-
-
-def table(head, rows):
-    lines = ["| " + " | ".join(head) + " |",
-             "| --- |" + " ---: |" * (len(head) - 1)]
-    return lines + ["| " + " | ".join(row) + " |" for row in rows]
-
-
-def number(value, digits=2):
-    if value is None or not math.isfinite(value):
-        return "-"
-    return f"{value:#.{digits}g}".rstrip(".") if value < 10 ** digits else f"{value:.0f}"
 
 
 def ratio(value):
@@ -273,34 +261,6 @@ def say_requirement(curves, reference):
     return text + (f" and **missed** on {', '.join(missed)}." if missed else ".")
 
 
-def get_machine():
-    model = "unknown processor"
-    with open("/proc/cpuinfo", encoding="utf-8") as f:
-        for line in f:
-            if line.startswith("model name"):
-                model = line.split(":", 1)[1].strip()
-                break
-    return f"{model}, {os.cpu_count()} processors"
-
-
-def get_commit():
-    if os.environ.get("GN_COMMIT"):  # what was measured, where the tree has moved on since
-        return os.environ["GN_COMMIT"]
-    here = os.path.dirname(os.path.abspath(__file__))
-    done = subprocess.run(["git", "-C", here, "log", "-1", "--format=%h of %cs"],
-                          capture_output=True, text=True)
-    return done.stdout.strip() or "unknown"
-
-
-PLOT_HEAD = """
-set logscale xy
-set grid
-set key off
-set format y "%g"
-set style line 100 lc rgb "#999999" dt 2 lw 1
-"""
-
-
 def plot_panel(out, curves, map_name, axis, title, is_last, floor):
     """axis 1: time, 0: lights."""
     names = curves.methods + [BASE]
@@ -324,16 +284,6 @@ def plot_panel(out, curves, map_name, axis, title, is_last, floor):
 
 COLORS = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2",
           "#bcbd22", "#7f7f7f", "#393b79"]
-
-
-def draw(folder, name, body, size):
-    for terminal, suffix in (("svg", "svg"), ("pngcairo", "png")):
-        scale = f"{size[0]},{size[1]}"
-        script = (f"set terminal {terminal} size {scale} font 'sans,11' background rgb 'white'\n"
-                  f"set output '{os.path.join(folder, name)}.{suffix}'\n{PLOT_HEAD}{body}\nunset multiplot\n")
-        done = subprocess.run(["gnuplot"], input=script, text=True, capture_output=True)
-        if done.returncode:
-            sys.exit(f"gnuplot, {name}.{suffix}: {done.stderr.strip()}")
 
 
 def draw_all(folder, curves, stream):

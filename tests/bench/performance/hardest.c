@@ -5,9 +5,6 @@
  * renderer's and those of the naive loop in turn. The naive frame is the renderer's own without
  * shadow, and then the loop.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "tests/bench/performance/naive.h"
@@ -44,27 +41,6 @@ static const struct kind kinds[] = {
 
 static const char *const order_names[] = {"pixels", "lights"};
 static const char *const real_names[] = {"none", "first", "where-cut"};
-
-struct gn_shadow_difference gn_performance_compare(const struct gn_image *a,
-                                                   const struct gn_image *b)
-{
-    static const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
-    const double limit = 1.0 / 255;
-    struct gn_shadow_difference d = {0};
-    for (size_t i = 0; i < (size_t)a->width * (size_t)a->height; i++) {
-        bool is_off = false;
-        for (size_t k = 3 * i; k < 3 * i + 3; k++) {
-            double factor = fabs((double)a->data[k] - b->data[k]);
-            double code = fabs((double)gn_response_encode(&srgb, a->data[k]) -
-                               gn_response_encode(&srgb, b->data[k]));
-            d.largest = fmax(d.largest, factor);
-            d.largest_code = fmax(d.largest_code, code);
-            is_off |= !(factor <= limit) || !(code <= limit); // a NaN is off
-        }
-        d.n_off += is_off;
-    }
-    return d;
-}
 
 /** The naive loop of one kind's i-th peer. */
 static void choose_peer(const struct kind *kind, int i, struct gn_naive *naive)

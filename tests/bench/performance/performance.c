@@ -19,6 +19,9 @@ static const struct part {
     void (*measure)(const struct gn_performance *run);
 } parts[] = {
     {"hardest", gn_performance_measure_hardest},
+    {"rate", gn_performance_measure_rate},
+    {"error", gn_performance_measure_error},
+    {"scaling", gn_performance_measure_scaling},
 };
 
 FILE *gn_performance_open(const struct gn_performance *run, const char *name, const char *head)
@@ -51,8 +54,10 @@ static void write_run(const struct gn_performance *run)
 
 static int refuse(const char *name)
 {
-    fprintf(stderr, "usage: %s [--part NAME] [--repeats 3..%d] [--threads 1..256] FOLDER\n", name,
-            GN_BENCH_REPEATS_MAX);
+    fprintf(
+        stderr,
+        "usage: %s [--part NAME] [--cache FOLDER] [--repeats 3..%d] [--threads 1..256] FOLDER\n",
+        name, GN_BENCH_REPEATS_MAX);
     fprintf(stderr, "Writes CSV tables into FOLDER. Parts:");
     for (size_t i = 0; i < GN_ARRAY_LEN(parts); i++)
         fprintf(stderr, " %s", parts[i].name);
@@ -69,6 +74,8 @@ int main(int argc, char **argv)
         bool has_value = i + 1 < argc;
         if (strcmp(argv[i], "--part") == 0 && has_value)
             only = argv[++i];
+        else if (strcmp(argv[i], "--cache") == 0 && has_value)
+            run.cache = argv[++i];
         else if (strcmp(argv[i], "--repeats") == 0 && has_value)
             run.n_repeats = atoi(argv[++i]);
         else if (strcmp(argv[i], "--threads") == 0 && has_value)
@@ -88,8 +95,11 @@ int main(int argc, char **argv)
     }
     if (!is_known)
         return refuse(argv[0]);
-    if (mkdir(run.folder, 0777) != 0 && errno != EEXIST)
-        gn_bench_check(-errno, run.folder);
+    const char *folders[] = {run.folder, run.cache};
+    for (int i = 0; i < 2; i++) {
+        if (folders[i] && mkdir(folders[i], 0777) != 0 && errno != EEXIST)
+            gn_bench_check(-errno, folders[i]);
+    }
     for (size_t i = 0; i < GN_ARRAY_LEN(parts); i++) {
         if (!only || strcmp(only, parts[i].name) == 0)
             parts[i].measure(&run);

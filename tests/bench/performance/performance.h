@@ -14,6 +14,7 @@
 /** What a run is about. */
 struct gn_performance {
     const char *folder; // of the tables
+    const char *cache;  // of references; NULL: they are made anew
     int n_threads;
     int n_repeats; // [3, GN_BENCH_REPEATS_MAX]
 };
@@ -33,5 +34,11 @@ struct gn_shadow_difference gn_performance_compare(const struct gn_image *a,
 
 /** The paper's hardest frame beside the naive loop's. */
 void gn_performance_measure_hardest(const struct gn_performance *run);
+/** The frame's shadow rays beside the tracer's own loop over them. */
+void gn_performance_measure_rate(const struct gn_performance *run);
+/** Error of the shadow and time over the number of lights. */
+void gn_performance_measure_error(const struct gn_performance *run);
+/** Time over pixels, lights, triangles, threads. */
+void gn_performance_measure_scaling(const struct gn_performance *run);
 
 #endif
