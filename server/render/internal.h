@@ -187,6 +187,13 @@ struct receivers {
     struct box box;                                   // of all
 };
 
+/** Clusters that rays down from a block may meet. */
+struct low_list {
+    int block; // -1: not made
+    int n;
+    struct box boxes[MAX_CLUSTERS]; // widened
+};
+
 /** What one worker needs for a batch, and its counts. */
 struct scratch {
     struct sample samples[BATCH];
@@ -194,6 +201,7 @@ struct scratch {
     struct receivers receivers;
     int16_t shadow_lights[GN_LIGHTS_MAX]; // those that virtual objects may hide from a receiver
     int n_shadow_lights;
+    struct low_list low[2];                        // of the real, the virtual silhouette
     uint16_t cut[BATCH / LANES][GN_LIGHTS_MAX];    // per block and light, bit i: virtual objects
     uint16_t hidden[BATCH / LANES][GN_LIGHTS_MAX]; // (real objects) hide it from lane i
     uint16_t near_cut[BATCH / LANES][GN_NEAR_LIGHTS_MAX]; // the same of near lights

@@ -20,13 +20,59 @@
 
 #include "server/render/silhouette.h"
 
-/** Do rays away from the light, from points of the box, surely miss the virtual objects? Then what
- * their lines meet is on the light's side. */
-static bool is_before_virtual(const struct frame *frame, const struct box *box,
-                              const float dir[static 3])
+/** Is some of the box less than the margin above the tangent plane of one of the receivers? */
+static bool is_low(const struct frame *frame, const struct receivers *r, int first, int n,
+                   const struct box *box)
+{
+    bool is_any = false;
+    for (int j = first; j < first + n; j++) {
+        double height = 0;
+        for (int k = 0; k < 3; k++) {
+            double g = r->geometric[k][j];
+            height += g * ((double)(g > 0 ? box->min[k] : box->max[k]) - r->org[k][j]);
+        }
+        is_any |= height < (double)frame->margin;
+    }
+    return is_any;
+}
+
+/** Lists the clusters of a silhouette that rays down from a block may meet, widened. */
+static void list_low(const struct frame *frame, const struct receivers *r, int block,
+                     const struct clusters *clusters, struct low_list *out)
+{
+    int first = block * LANES;
+    int n = r->n - first < LANES ? r->n - first : LANES;
+    bool is_real = clusters->role == GN_RT_REAL;
+    out->block = block;
+    out->n = 0;
+    if (!is_real && !is_low(frame, r, first, n, &frame->virtual_box))
+        return;
+    for (int c = 0; c < clusters->n; c++) {
+        const struct cluster *cluster = &clusters->cluster[c];
+        if ((is_real && cluster->is_flat) || !is_low(frame, r, first, n, &cluster->box))
+            continue;
+        struct box *box = &out->boxes[out->n++];
+        for (int k = 0; k < 3; k++) {
+            box->min[k] = cluster->box.min[k] - frame->margin;
+            box->max[k] = cluster->box.max[k] + frame->margin;
+        }
+    }
+}
+
+/** Do rays away from the light, from points of a block, surely miss what its silhouette is of (0:
+ * the real one, 1: the virtual one)? Then what their lines meet is on the light's side. */
+static bool is_before(const struct frame *frame, struct scratch *scratch, int block,
+                      const float dir[static 3], int set)
 {
     const float back[3] = {-dir[0], -dir[1], -dir[2]};
-    return !gn_box_may_meet_from_box(&frame->virtual_box, box, back);
+    struct low_list *low = &scratch->low[set];
+    if (low->block != block)
+        list_low(frame, &scratch->receivers, block, &frame->clusters[set], low);
+    for (int i = 0; i < low->n; i++) {
+        if (gn_box_may_meet_from_box(&low->boxes[i], &scratch->receivers.boxes[block], back))
+            return false;
+    }
+    return true;
 }
 
 /** Which lanes of a block does the virtual objects' silhouette hide; rays where it does not say. */
@@ -41,7 +87,7 @@ static void cut_block(const struct frame *frame, struct scratch *scratch, int bl
     if ((dark | edge) == 0)
         return;
     unsigned lanes = gn_receivers_get_lit(frame, r, block, dir) & (dark | edge);
-    if ((lanes & dark) != 0 && is_before_virtual(frame, &r->boxes[block], dir)) {
+    if ((lanes & dark) != 0 && is_before(frame, scratch, block, dir, 1)) {
         scratch->cut[block][light] |= (uint16_t)(lanes & dark);
         lanes &= ~dark;
     }
@@ -73,17 +119,17 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
 {
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
-    for (int i = 0; i < scratch->n_shadow_lights; i++) {
-        int l = scratch->shadow_lights[i];
-        float dir[3];
-        gn_render_lights_get_dir(lights, l, dir);
-        const struct silhouette *s =
-            frame->virtual_silhouettes ? &frame->virtual_silhouettes[l] : NULL;
-        for (int b = 0; b < r->n_blocks; b++) {
-            if (!s)
+    for (int b = 0; b < r->n_blocks; b++) {
+        scratch->low[1].block = -1;
+        for (int i = 0; i < scratch->n_shadow_lights; i++) {
+            int l = scratch->shadow_lights[i];
+            float dir[3];
+            gn_render_lights_get_dir(lights, l, dir);
+            if (!frame->virtual_silhouettes)
                 gn_receivers_trace(frame, scratch, b, l, gn_receivers_get_lit(frame, r, b, dir),
                                    GN_RT_VIRTUAL, scratch->cut, &figures->rays_shadow);
-            else if (gn_silhouette_get_box(s, &r->boxes[b]) != SILHOUETTE_FREE)
+            else if (gn_silhouette_get_box(&frame->virtual_silhouettes[l], &r->boxes[b]) !=
+                     SILHOUETTE_FREE)
                 cut_block(frame, scratch, b, l, dir, figures);
         }
     }
@@ -99,36 +145,63 @@ static void find_cut(const struct frame *frame, struct scratch *scratch,
     }
 }
 
-/** The flat ones of n boxes that rays from `from` may meet, into out. */
-static int list_flat(const struct frame *frame, const struct box *const *boxes, int n,
-                     const struct box *from, const float dir[static 3], const struct box **out)
+/** A flat real object and the lanes of a block that do not have it under their tangent planes. */
+struct flat {
+    const struct box *box; // widened
+    unsigned lanes;
+};
+
+static int list_flat(const struct frame *frame, const struct receivers *r, int block,
+                     const struct box *const *boxes, int n, struct flat *out)
 {
     int n_out = 0;
     for (int i = 0; i < n; i++) {
-        if (frame->clusters[0].is_flat[boxes[i] - frame->wide_blockers] &&
-            gn_box_may_meet_from_box(boxes[i], from, dir))
-            out[n_out++] = boxes[i];
+        int index = (int)(boxes[i] - frame->wide_blockers);
+        const struct box *exact = &frame->blockers[index];
+        unsigned lanes = 0;
+        for (int lane = 0; lane < LANES && frame->clusters[0].is_flat[index]; lane++) {
+            int j = block * LANES + lane;
+            double highest = 0;
+            for (int k = 0; k < 3; k++) {
+                double g = r->geometric[k][j];
+                highest += g * ((double)(g > 0 ? exact->max[k] : exact->min[k]) - r->org[k][j]);
+            }
+            lanes |= (unsigned)(highest > 0) << lane;
+        }
+        if (lanes != 0)
+            out[n_out++] = (struct flat){boxes[i], lanes};
     }
     return n_out;
 }
 
-/** Lanes of a block that real objects may hide from the light: those that a flat one's box or the
- * others' silhouette does not rule out. */
-static unsigned get_doubtful_lanes(const struct frame *frame, const struct scratch *scratch,
-                                   int block, int light, const float dir[static 3],
-                                   const struct box *const *flat, int n_flat)
+/** Which of a block's lanes do real objects hide from the light? Rays where neither the boxes of
+ * the flat ones nor the silhouette of the others say. */
+static void hide_block(const struct frame *frame, struct scratch *scratch, int block, int light,
+                       const struct flat *flat, int n_flat, uint64_t *rays)
 {
     const struct receivers *r = &scratch->receivers;
     const struct silhouette *s = &frame->real_silhouettes[light];
+    unsigned lanes = r->wanted[block];
     unsigned dark = 0;
     unsigned edge = 0;
-    for (int i = 0; i < n_flat; i++) {
-        if (gn_box_may_meet_from_box(flat[i], &r->boxes[block], dir))
-            return 0xffff;
-    }
+    float dir[3];
+    gn_render_lights_get_dir(frame->lights, light, dir);
     if (gn_silhouette_get_box(s, &r->boxes[block]) != SILHOUETTE_FREE)
         gn_silhouette_get_block(frame, s, r, block, &dark, &edge);
-    return dark | edge;
+    unsigned doubtful = dark | edge;
+    for (int i = 0; i < n_flat; i++) {
+        if (gn_box_may_meet_from_box(flat[i].box, &r->boxes[block], dir))
+            doubtful |= flat[i].lanes;
+    }
+    lanes &= doubtful;
+    if (lanes == 0)
+        return;
+    lanes &= gn_receivers_get_lit(frame, r, block, dir);
+    if ((lanes & dark) != 0 && is_before(frame, scratch, block, dir, 0)) {
+        scratch->hidden[block][light] |= (uint16_t)(lanes & dark);
+        lanes &= ~dark;
+    }
+    gn_receivers_trace(frame, scratch, block, light, lanes, GN_RT_REAL, scratch->hidden, rays);
 }
 
 /** Which lights do real objects hide from the wanted receivers? */
@@ -140,21 +213,19 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
     const struct box *boxes[MAX_BLOCKERS];
     int n_boxes = frame->real_silhouettes ? gn_blockers_list_above(frame, r, boxes) : 0;
     uint64_t n_rays = 0;
-    for (int l = 0; l < lights->n; l++) {
-        const struct silhouette *s = frame->real_silhouettes ? &frame->real_silhouettes[l] : NULL;
-        const struct box *flat[MAX_BLOCKERS];
-        float dir[3];
-        gn_render_lights_get_dir(lights, l, dir);
-        int n_flat = s ? list_flat(frame, boxes, n_boxes, &r->box, dir, flat) : 0;
-        if (s && n_flat == 0 && gn_silhouette_get_box(s, &r->box) == SILHOUETTE_FREE)
-            continue;
-        for (int b = 0; b < r->n_blocks; b++) {
-            unsigned lanes = r->wanted[b];
-            if (lanes != 0 && s)
-                lanes &= get_doubtful_lanes(frame, scratch, b, l, dir, flat, n_flat);
-            if (lanes != 0)
-                lanes &= gn_receivers_get_lit(frame, r, b, dir);
-            gn_receivers_trace(frame, scratch, b, l, lanes, GN_RT_REAL, scratch->hidden, &n_rays);
+    scratch->low[0].block = -1;
+    for (int b = 0; b < r->n_blocks; b++) {
+        struct flat flat[MAX_BLOCKERS];
+        int n_flat = r->wanted[b] != 0 ? list_flat(frame, r, b, boxes, n_boxes, flat) : 0;
+        for (int l = 0; l < lights->n && r->wanted[b] != 0; l++) {
+            float dir[3];
+            gn_render_lights_get_dir(lights, l, dir);
+            if (frame->real_silhouettes)
+                hide_block(frame, scratch, b, l, flat, n_flat, &n_rays);
+            else
+                gn_receivers_trace(frame, scratch, b, l,
+                                   gn_receivers_get_lit(frame, r, b, dir) & r->wanted[b],
+                                   GN_RT_REAL, scratch->hidden, &n_rays);
         }
     }
     gn_receivers_flush(frame, scratch, GN_RT_REAL, scratch->hidden, &n_rays);
