@@ -174,7 +174,7 @@ def draw_error(folder, pairs):
     body = ("set xlabel 'ms, whole frame, 640 x 480'\nset ylabel 'RMSE of the shadow'\nset key right top\n"
             f"set arrow from {BUDGET_MS},graph 0 to {BUDGET_MS},graph 1 nohead dt 2 lc rgb '#666666'\n"
             f"set arrow from graph 0,first {GOAL_RMSE} to graph 1,first {GOAL_RMSE} nohead dt 2 lc rgb '#666666'\n"
-            f"set xrange [*:*]\nset yrange [*:*]\nset offsets graph 0.05,0.25,0,0\nplot {', '.join(parts)}\n")
+            f"set xrange [*:*]\nset yrange [*:*]\nset offsets graph 0.05, graph 0.35, graph 0, graph 0\nplot {', '.join(parts)}\n")
     draw(folder, "performance-error", body, (800, 520))
 
 
