@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * Rays against triangles. rt_embree.c is the only file of the project that names Embree.
+ * Rays against triangles. The files rt_embree* are the only ones of the project that name Embree.
  * Closed meshes are watertight, along shared edges too; only of the rays that aim at a vertex to
  * the last bit do some slip through (0.7 % of such in a sphere of 40,000 triangles). World
  * coordinates, metres. Two sets of geometry: real (only felt) and virtual (drawn); a ray asks one
@@ -15,6 +15,7 @@
 
 #include "common/error.h"
 #include "common/pool.h"
+#include "common/pose.h"
 #include "proto/attr.h"
 #include "server/scene/mesh.h"
 
@@ -24,11 +25,17 @@ enum gn_rt_set { GN_RT_REAL = 1, GN_RT_VIRTUAL = 2, GN_RT_ALL = 3 };
 /** How many rays a packet holds. */
 #define GN_RT_PACKET 16
 
-/** A committed scene for rays. Thread-safety: immutable after gn_rt_commit; then rays are safe. */
+/**
+ * A committed scene for rays. Thread-safety: immutable after gn_rt_commit (a posed one: between two
+ * calls of gn_rt_set_poses); then rays are safe.
+ */
 struct gn_rt;
 
 /** Largest coordinate a vertex may have in world, m. */
 #define GN_RT_MAX_COORDINATE 1e11
+
+/** Share of the largest coordinate of a mover's box by which rounding may move it; a bound. */
+#define GN_RT_MOVED_ROUNDING (8 * 1.1920929e-7f)
 
 /** Where a ray met a surface. */
 struct gn_rt_hit {
@@ -69,8 +76,36 @@ GN_MUST_USE int gn_rt_add_mesh(struct gn_rt *rt, enum gn_rt_set set, uint32_t ob
                                const double world_from_object[static 16],
                                struct gn_error *out_error);
 
-/** Builds the trees; pool (may be NULL) helps. Returns 0 or -EIO. Nothing may be added after. */
+/**
+ * Adds a mesh that can move. object_from_mesh is what stays with it (scale), world_from_object
+ * where it stands until a posed scene says otherwise. Movers are counted in the order they are
+ * added. The rest as gn_rt_add_mesh.
+ */
+GN_MUST_USE int gn_rt_add_mover(struct gn_rt *rt, enum gn_rt_set set, uint32_t object,
+                                const struct gn_mesh *mesh,
+                                const double object_from_mesh[static 16],
+                                const struct gn_pose *world_from_object,
+                                struct gn_error *out_error);
+
+/** Builds the trees; pool (may be NULL) helps. Returns 0, -ENOMEM, -EIO, -EINVAL (done already, or
+ * a mover stands beyond GN_RT_MAX_COORDINATE). Nothing may be added after. */
 GN_MUST_USE int gn_rt_commit(struct gn_rt *rt, struct gn_pool *pool, struct gn_error *out_error);
+
+/**
+ * A scene that shares everything with a committed one, which must outlive it, but where its movers
+ * stand: at first as in the source. Costs O(movers), whatever their triangles. Destroyed like any.
+ * Returns 0, -EINVAL, -ENOMEM, -EIO.
+ */
+GN_MUST_USE int gn_rt_create_posed(const struct gn_rt *source, struct gn_rt **out_rt,
+                                   struct gn_error *out_error);
+
+/**
+ * Sets where all movers of a posed scene stand: poses[i] of the i-th, unit quaternions. Only while
+ * nobody sends rays into it. Returns 0, -EINVAL (not a posed scene, beyond GN_RT_MAX_COORDINATE;
+ * nothing moved), -EIO.
+ */
+GN_MUST_USE int gn_rt_set_poses(struct gn_rt *rt, const struct gn_pose *poses,
+                                struct gn_error *out_error);
 
 /** Axis-aligned bounds of a set in world m. False where the set is empty. */
 bool gn_rt_get_bounds(const struct gn_rt *rt, enum gn_rt_set set, float out_min[static 3],
@@ -92,9 +127,11 @@ uint32_t gn_rt_get_occluded16(const struct gn_rt *rt, enum gn_rt_set set,
 /**
  * Moves a hit point off its surface, by the hit's clearance along the geometric normal, to the side
  * that `toward` points to: far enough that a new ray does not meet the same surface, not farther.
- *   clearance = 2^-23 (4 max|p| + 16 max|v_i - p|), |.| the largest coordinate
- * bounds what rounds: the point and the new origin (half an ulp of each coordinate, twice), and the
- * tracer's own v_i - origin and their products (a few ulp of the triangle's size). It holds no
+ *   clearance = 2^-23 (4 max|p| + 16 max|v_i - p| + 8 m), |.| the largest coordinate
+ * bounds what rounds: the point and the new origin (half an ulp of each coordinate, twice), the
+ * tracer's own v_i - origin and their products (a few ulp of the triangle's size), and for a mover,
+ * m the largest coordinate of its box in world, the way into its own coordinates: two sums of three
+ * products that are at most m each, and the rounded inverse (for what rests, m is 0). It holds no
  * constant length, so it fits a scene of any size anywhere. Steps that know only the point
  * (Waechter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
  * Gems, 2019, chapter 6) avoid acne as well, but lift by 1/65536 m near the origin: 1.5 % of an

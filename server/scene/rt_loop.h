@@ -25,7 +25,7 @@ void gn_rt_loop_run(struct gn_rt_loop *loop);
 /** How many of the last run's rays are occluded. */
 uint64_t gn_rt_loop_count_occluded(const struct gn_rt_loop *loop);
 
-/** The tracer's own tree of a set: for rt_embree_loop.c. */
+/** The tracer's own tree of what rests of a set, NULL where nothing does: for rt_embree_loop.c. */
 void *gn_rt_get_tree(const struct gn_rt *rt, enum gn_rt_set set);
 
 #endif

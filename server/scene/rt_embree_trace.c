@@ -1,0 +1,202 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "server/scene/rt_embree.h"
+
+#include <assert.h>
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* The only difference between Embree 3 and 4: how a call gets its arguments. */
+#ifdef GN_HAVE_EMBREE4
+static void trace_intersect1(RTCScene scene, struct RTCRayHit *rayhit)
+{
+    rtcIntersect1(scene, rayhit, NULL);
+}
+
+static void trace_occluded1(RTCScene scene, struct RTCRay *ray)
+{
+    rtcOccluded1(scene, ray, NULL);
+}
+
+static void trace_occluded16(const int *valid, RTCScene scene, struct RTCRay16 *ray)
+{
+    rtcOccluded16(valid, scene, ray, NULL);
+}
+#else
+static void trace_intersect1(RTCScene scene, struct RTCRayHit *rayhit)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene, &context, rayhit);
+}
+
+static void trace_occluded1(RTCScene scene, struct RTCRay *ray)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(scene, &context, ray);
+}
+
+static void trace_occluded16(const int *valid, RTCScene scene, struct RTCRay16 *ray)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcOccluded16(valid, scene, &context, ray);
+}
+#endif
+
+/** The first two rows of Embree's ray are written as a whole each, since Embree reads them so: read
+ * soon after four single writes they wait for these, for longer than many a ray takes to trace. */
+static struct RTCRay make_ray(const float org[static 3], const float dir[static 3], float t_near,
+                              float t_far)
+{
+    typedef float row __attribute__((vector_size(16)));
+    const row rows[2] = {{org[0], org[1], org[2], t_near}, {dir[0], dir[1], dir[2], 0}};
+    struct RTCRay ray = {.tfar = t_far, .mask = 0xffffffffu};
+    memcpy(&ray, rows, sizeof(rows));
+    return ray;
+}
+
+/** World point or (w 0) direction of a mover's own one. */
+static void to_world(const float m[static 12], const double p[static 3], double w, double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = m[k] * p[0] + m[3 + k] * p[1] + m[6 + k] * p[2] + w * m[9 + k];
+}
+
+/** Point, normal and clearance from the triangle's own vertices, in double, rounded once. */
+static void fill_hit(const struct rt_mesh *mesh, const struct rt_stand *stand,
+                     struct gn_rt_hit *hit)
+{
+    const uint32_t *index = mesh->triangles + 3 * (size_t)hit->triangle;
+    const float *v0 = mesh->vertices + 3 * (size_t)index[0];
+    const float *v1 = mesh->vertices + 3 * (size_t)index[1];
+    const float *v2 = mesh->vertices + 3 * (size_t)index[2];
+    double e1[3];
+    double e2[3];
+    double p[3];
+    double magnitude = 0.0;
+    double extent = 0.0;
+    for (int k = 0; k < 3; k++) {
+        e1[k] = (double)v1[k] - v0[k];
+        e2[k] = (double)v2[k] - v0[k];
+        p[k] = v0[k] + (double)hit->u * e1[k] + (double)hit->v * e2[k];
+        extent =
+            fmax(extent, fmax(fabs(v0[k] - p[k]), fmax(fabs(v1[k] - p[k]), fabs(v2[k] - p[k]))));
+    }
+    double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2],
+                   e1[0] * e2[1] - e1[1] * e2[0]};
+    if (stand) {
+        const double own[3] = {p[0], p[1], p[2]};
+        const double own_n[3] = {n[0], n[1], n[2]};
+        to_world(stand->world_from_own, own, 1.0, p);
+        to_world(stand->world_from_own, own_n, 0.0, n);
+    }
+    for (int k = 0; k < 3; k++) {
+        hit->point[k] = (float)p[k];
+        magnitude = fmax(magnitude, fabs(p[k]));
+    }
+    hit->clearance = (float)(FLT_EPSILON * (4.0 * magnitude + 16.0 * extent));
+    if (stand)
+        hit->clearance += GN_RT_MOVED_ROUNDING * stand->reach;
+    double scale = 1.0 / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (mesh->mirrored)
+        scale = -scale;
+    for (int k = 0; k < 3; k++)
+        hit->normal[k] = (float)(n[k] * scale);
+}
+
+bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
+                     const float dir[static 3], float t_near, float t_far,
+                     struct gn_rt_hit *out_hit)
+{
+    assert(rt->is_committed);
+    struct RTCRayHit rayhit = {
+        .ray = make_ray(org, dir, t_near, t_far),
+        .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .instID = {RTC_INVALID_GEOMETRY_ID}},
+    };
+    if (rt->scenes[set - 1])
+        trace_intersect1(rt->scenes[set - 1], &rayhit);
+    if (rt->moving[set - 1]) // only what is nearer than what rests
+        trace_intersect1(rt->moving[set - 1], &rayhit);
+    if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+        return false;
+    unsigned mover = rayhit.hit.instID[0];
+    bool moves = mover != RTC_INVALID_GEOMETRY_ID;
+    const struct rt_mesh *mesh = moves ? &rt->movers[mover].mesh : &rt->meshes[rayhit.hit.geomID];
+    *out_hit = (struct gn_rt_hit){
+        .distance = rayhit.ray.tfar,
+        .u = rayhit.hit.u,
+        .v = rayhit.hit.v,
+        .object = mesh->object,
+        .triangle = rayhit.hit.primID,
+    };
+    fill_hit(mesh, moves ? &rt->stands[mover] : NULL, out_hit);
+    return true;
+}
+
+bool gn_rt_is_occluded(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
+                       const float dir[static 3], float t_near, float t_far)
+{
+    assert(rt->is_committed);
+    struct RTCRay ray = make_ray(org, dir, t_near, t_far);
+    if (rt->scenes[set - 1])
+        trace_occluded1(rt->scenes[set - 1], &ray);
+    if (rt->moving[set - 1] && ray.tfar >= 0.0f)
+        trace_occluded1(rt->moving[set - 1], &ray);
+    return ray.tfar < 0.0f; // Embree's mark of a hit: -inf
+}
+
+/** Those of the lanes that the ray arrays now say are hidden. */
+static uint32_t get_hidden(const struct RTCRay16 *ray, const int32_t *valid)
+{
+    uint32_t hidden = 0;
+    for (int i = 0; i < GN_RT_PACKET; i++)
+        hidden |= (uint32_t)(valid[i] != 0 && ray->tfar[i] < 0.0f) << i;
+    return hidden;
+}
+
+uint32_t gn_rt_get_occluded16(const struct gn_rt *rt, enum gn_rt_set set,
+                              const struct gn_rt_packet *packet)
+{
+    assert(rt->is_committed);
+    struct RTCRay16 ray;
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        ray.org_x[i] = packet->org_x[i];
+        ray.org_y[i] = packet->org_y[i];
+        ray.org_z[i] = packet->org_z[i];
+        ray.tnear[i] = packet->t_near[i];
+        ray.dir_x[i] = packet->dir_x[i];
+        ray.dir_y[i] = packet->dir_y[i];
+        ray.dir_z[i] = packet->dir_z[i];
+        ray.time[i] = 0.0f;
+        ray.tfar[i] = packet->t_far[i];
+        ray.mask[i] = 0xffffffffu;
+        ray.id[i] = 0;
+        ray.flags[i] = 0;
+    }
+    if (rt->scenes[set - 1])
+        trace_occluded16(packet->valid, rt->scenes[set - 1], &ray);
+    if (!rt->moving[set - 1])
+        return get_hidden(&ray, packet->valid);
+    _Alignas(64) int32_t valid[GN_RT_PACKET];
+    int n = 0;
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        valid[i] = packet->valid[i] != 0 && !(ray.tfar[i] < 0.0f) ? -1 : 0;
+        n -= valid[i];
+    }
+    if (n > 0)
+        trace_occluded16(valid, rt->moving[set - 1], &ray);
+    return get_hidden(&ray, packet->valid);
+}
+
+void gn_rt_offset_origin(const float point[static 3], const float normal[static 3], float clearance,
+                         const float toward[static 3], float out_org[static 3])
+{
+    float side = normal[0] * toward[0] + normal[1] * toward[1] + normal[2] * toward[2];
+    float step = side < 0.0f ? -clearance : clearance;
+    for (int k = 0; k < 3; k++)
+        out_org[k] = point[k] + step * normal[k];
+}
