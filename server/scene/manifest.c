@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * scene.json: {"objects": [{"mesh", "role", "name", "material", "world_from_object"}], "lights":
- * [...]}; what sends light is read in manifest_light.c.
+ * scene.json: {"objects": [{"mesh", "role", "name", "material", "world_from_object", "movable"}],
+ * "lights": [...]}; what sends light is read in manifest_light.c.
  */
 #include "server/scene/manifest.h"
 
@@ -139,7 +139,8 @@ static int read_mesh(const struct gn_json *item, const char *mesh, struct gn_sce
 static int read_object(const struct gn_json *item, struct gn_scene_object *object,
                        struct gn_error *out_error)
 {
-    static const char *const keys[] = {"mesh", "role", "name", "material", "world_from_object"};
+    static const char *const keys[] = {"mesh",   "role", "name", "material", "world_from_object",
+                                       "movable"};
     static const char *const roles[] = {"real", "virtual"};
     static const enum gn_rt_set role_sets[] = {GN_RT_REAL, GN_RT_VIRTUAL};
     const char *mesh = NULL;
@@ -155,6 +156,8 @@ static int read_object(const struct gn_json *item, struct gn_scene_object *objec
         ret = read_material(item, object, out_error);
     if (ret == 0)
         ret = read_transform(item, object, out_error);
+    if (ret == 0 && gn_json_has(item, "movable"))
+        ret = gn_json_get_bool(item, "movable", &object->is_movable, out_error);
     if (ret < 0)
         return ret;
     object->role = role_sets[role];
@@ -210,12 +213,14 @@ int gn_scene_read_file(const char *path, struct gn_pool *pool, struct gn_scene *
         goto out;
     struct gn_error reason = {0};
     ret = gn_scene_create(objects, n_objects, pool, out_scene, &reason);
-    if (ret == 0 && (ret = gn_scene_set_lights(*out_scene, lights, n_lights, &reason)) < 0)
+    if (ret == 0)
+        ret = gn_scene_set_lights(*out_scene, lights, n_lights, &reason);
+    if (ret == 0)
+        ret = gn_scene_set_model(*out_scene, (enum gn_scene_model)model, &reason);
+    if (ret < 0)
         gn_scene_destroy(out_scene);
     if (ret < 0)
         (void)gn_error_set(out_error, ret, "%s: %s", path, reason.text);
-    else
-        (*out_scene)->model = (enum gn_scene_model)model;
 out:
     for (int i = 0; objects && i < n_objects; i++) { // zeroed where the scene took them
         free(objects[i].name);

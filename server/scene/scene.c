@@ -9,6 +9,7 @@
 
 #include "common/pose.h"
 #include "server/scene/emission.h"
+#include "server/scene/motion.h"
 
 static void finish_objects(struct gn_scene_object *objects, int n_objects)
 {
@@ -30,6 +31,7 @@ void gn_scene_destroy(struct gn_scene **scene)
         finish_objects(self->objects, self->n_objects);
     free(self->objects);
     free(self->lights);
+    free(self->movable);
     free(self);
 }
 
@@ -45,7 +47,7 @@ static int check_material(struct gn_scene_object *object, int index, struct gn_e
 }
 
 /** Inverse transpose of the 3x3 part; gn_rt_add_mesh has refused singular matrices. */
-static void fill_normal_matrix(struct gn_scene_object *object)
+void gn_scene_fill_normal_matrix(struct gn_scene_object *object)
 {
     double inverse[16] = {0};
     if (!gn_mat4_invert(object->world_from_object, inverse))
@@ -99,12 +101,17 @@ static int add_object(struct gn_scene *scene, int index, struct gn_error *out_er
 {
     struct gn_scene_object *object = &scene->objects[index];
     struct gn_error reason = {0};
-    int ret = gn_rt_add_mesh(scene->rt, object->role, (uint32_t)index, &object->mesh,
-                             object->world_from_object, &reason);
+    int ret = object->is_movable ? gn_motion_split_matrix(object, &reason) : 0;
+    if (ret == 0)
+        ret = object->is_movable
+                  ? gn_rt_add_mover(scene->rt, object->role, (uint32_t)index, &object->mesh,
+                                    object->object_from_mesh, &object->pose, &reason)
+                  : gn_rt_add_mesh(scene->rt, object->role, (uint32_t)index, &object->mesh,
+                                   object->world_from_object, &reason);
     if (ret < 0)
         return gn_error_set(out_error, ret, "object %d (%s): %s", index,
                             object->name ? object->name : "no name", reason.text);
-    fill_normal_matrix(object);
+    gn_scene_fill_normal_matrix(object);
     unsigned *types =
         object->role == GN_RT_REAL ? &scene->real_materials : &scene->virtual_materials;
     *types |= get_types(object);
@@ -143,6 +150,7 @@ int gn_scene_create(struct gn_scene_object *objects, int n_objects, struct gn_po
         goto out;
     // A plain copy while it may still fail: the arrays stay the caller's till the end.
     memcpy(scene->objects, objects, (size_t)n_objects * sizeof(*objects));
+    ret = gn_motion_list_movable(scene, n_objects, out_error);
     for (int i = 0; i < n_objects && ret == 0; i++)
         ret = add_object(scene, i, out_error);
     if (ret == 0)
@@ -156,6 +164,21 @@ int gn_scene_create(struct gn_scene_object *objects, int n_objects, struct gn_po
 out:
     gn_scene_destroy(&scene); // n_objects is still 0: nothing of the caller's is freed
     return ret;
+}
+
+int gn_scene_set_model(struct gn_scene *scene, enum gn_scene_model model,
+                       struct gn_error *out_error)
+{
+    for (int i = 0; i < scene->n_movable && model == GN_MODEL_GLOBAL; i++) {
+        const struct gn_scene_object *object = &scene->objects[scene->movable[i]];
+        if (object->role == GN_RT_REAL)
+            return gn_error_set(out_error, -EINVAL,
+                                "object %d (%s): real objects cannot move in the global model, "
+                                "where their light starts at them: take \"local\"",
+                                scene->movable[i], object->name);
+    }
+    scene->model = model;
+    return 0;
 }
 
 static int check_light(const struct gn_scene_light *light, int index, struct gn_error *out_error)

@@ -32,6 +32,8 @@ enum gn_scene_model {
 #define GN_SCENE_MAX_LIGHTS 1024
 /** Largest emission, W/(sr m^2), and intensity, W/sr. */
 #define GN_SCENE_MAX_EMISSION 1e12
+/** Longest name of a movable object: a POSE has room for it. */
+#define GN_SCENE_MAX_MOVABLE_NAME 63
 /** Longest name of a stream. */
 #define GN_SCENE_MAX_STREAM 63
 
@@ -49,9 +51,16 @@ struct gn_scene_object {
     float emission[3];
     char *emission_stream; // name of the pictures laid over the mesh's uvs; owned, may be NULL
     float emission_scale;  // W/(sr m^2) of a linear picture value of 1, > 0; with a stream
-    double world_from_object[16];
+    double world_from_object[16]; // of the mesh's coordinates
     double normal_matrix[9]; // inverse transpose of the 3x3 part, row-major, for shading normals
-    struct gn_mesh mesh;     // owned
+    /**
+     * A movable object (motion.h) stands at a pose that others may change; its mesh's scale stays
+     * with it: world_from_object = pose object_from_mesh. Both are made from world_from_object.
+     */
+    bool is_movable;
+    struct gn_pose pose;
+    double object_from_mesh[16];
+    struct gn_mesh mesh; // owned
 };
 
 /** A lamp of the scene's list: it sends alike all around. */
@@ -70,6 +79,9 @@ struct gn_scene {
     struct gn_rt *rt;                // owned, committed
     int n_lights;
     struct gn_scene_light *lights; // [n_lights], owned
+    int n_movable;
+    int *movable;     // [n_movable], owned: indices of objects; in this order rt's movers
+    uint64_t version; // of where they stand: 0 as in the manifest; each snapshot has its own
     int n_real_triangles;
     int n_virtual_triangles;
     unsigned real_materials; // bit 1 << type: some triangle is of it
@@ -83,16 +95,18 @@ struct gn_scene {
  *                              "albedo": [r, g, b], "roughness": 0, "metallic": 0, "ior": 1.5,
  *                              "emission": [r, g, b], "emission_stream": "tv",
  *                              "emission_scale": 1},
- *                 "world_from_object": [16 numbers, row-major]}],
+ *                 "world_from_object": [16 numbers, row-major], "movable": false}],
  *    "lights": [{"type": "point", "position": [x, y, z], "intensity": [r, g, b], "radius": 0,
  *                "role": "real" or "virtual"}]}
  * Of an object only mesh and role must be there, of a light type, position and intensity. Paths are
  * relative to the file. Without a material, or with a diffuse one without albedo, the mesh's own
  * colours count, or 0.5; a mirror's albedo is 1 unless said. The matrix may scale, shear and
- * mirror; absent, it is the identity. An unknown key, role or material, a missing mesh, a singular
- * matrix, light that is negative or above GN_SCENE_MAX_EMISSION, a mesh without uvs under a stream,
- * a scene without objects is refused with the file, the place and what would be right. Returns 0 or
- * a negative errno.
+ * mirror; absent, it is the identity. A movable object needs a name of its own of at most
+ * GN_SCENE_MAX_MOVABLE_NAME bytes, and its matrix may turn, move and scale alike in all directions;
+ * it cannot send light, nor be real in the global model. An unknown key, role or material, a
+ * missing mesh, a singular matrix, light that is negative or above GN_SCENE_MAX_EMISSION, a mesh
+ * without uvs under a stream, a scene without objects is refused with the file, the place and what
+ * would be right. Returns 0 or a negative errno.
  */
 GN_MUST_USE int gn_scene_read_file(const char *path, struct gn_pool *pool,
                                    struct gn_scene **out_scene, struct gn_error *out_error);
@@ -108,6 +122,14 @@ GN_MUST_USE int gn_scene_create(struct gn_scene_object *objects, int n_objects,
 /** Replaces the lights of a scene that nobody uses yet; copies. 0, -EINVAL, -ENOMEM. */
 GN_MUST_USE int gn_scene_set_lights(struct gn_scene *scene, const struct gn_scene_light *lights,
                                     int n_lights, struct gn_error *out_error);
+
+/** Sets the model of a scene that nobody uses yet. 0, or -EINVAL: a real object is movable in the
+ * global model. */
+GN_MUST_USE int gn_scene_set_model(struct gn_scene *scene, enum gn_scene_model model,
+                                   struct gn_error *out_error);
+
+/** From world_from_object; for motion.c. */
+void gn_scene_fill_normal_matrix(struct gn_scene_object *object);
 
 /** NULL-safe; nulls *scene. */
 void gn_scene_destroy(struct gn_scene **scene);

@@ -209,6 +209,53 @@ static void test_packets_agree_with_single_rays(void **state)
     gn_rt_destroy(&source);
 }
 
+/** Rays as a frame has them: from neighbours to one light, whose directions have zeros, too. */
+static void test_packets_to_one_light(void **state)
+{
+    (void)state;
+    struct gn_mesh ball = gn_test_make_sphere(0.25f, 5);
+    struct gn_rt *rt = NULL;
+    double identity[16];
+    uint64_t seed = 6;
+    int n = 0;
+    gn_mat4_identity(identity);
+    assert_int_equal(gn_rt_create(&rt, NULL), 0);
+    for (int i = 0; i < 4; i++) {
+        const struct gn_pose pose = {{1, 0, 0, 0}, {0.5 * (i % 2), -0.5 * (i / 2), 0.1 * i}};
+        assert_int_equal(gn_rt_add_mover(rt, GN_RT_VIRTUAL, BALL, &ball, identity, &pose, NULL), 0);
+    }
+    assert_int_equal(gn_rt_commit(rt, NULL, NULL), 0);
+    for (int round = 0; round < 20000; round++) {
+        struct gn_rt_packet packet = {0};
+        uint32_t expected = 0;
+        float at[3];
+        float dir[3];
+        draw_ray(&seed, at, dir);
+        if (round % 10 == 0) {
+            dir[0] = dir[1] = 0;
+            dir[2] = round % 20 ? 1 : -1;
+        }
+        for (int i = 0; i < GN_RT_PACKET; i++) {
+            const float org[3] = {at[0] + 0.02f * (float)(i % 4), at[1] + 0.02f * (float)(i / 4),
+                                  at[2]};
+            packet.org_x[i] = org[0];
+            packet.org_y[i] = org[1];
+            packet.org_z[i] = org[2];
+            packet.dir_x[i] = dir[0];
+            packet.dir_y[i] = dir[1];
+            packet.dir_z[i] = dir[2];
+            packet.t_far[i] = INFINITY;
+            packet.valid[i] = -1;
+            expected |= (uint32_t)gn_rt_is_occluded(rt, GN_RT_ALL, org, dir, 0.0f, INFINITY) << i;
+        }
+        assert_int_equal(gn_rt_get_occluded16(rt, GN_RT_ALL, &packet), expected);
+        n += expected != 0;
+    }
+    assert_in_range(n, 1000, 19000);
+    gn_mesh_finish(&ball);
+    gn_rt_destroy(&rt);
+}
+
 static void test_bounds_hold_what_moves(void **state)
 {
     (void)state;
@@ -270,6 +317,7 @@ int main(void)
         cmocka_unit_test(test_posed_scene_is_as_one_built_anew),
         cmocka_unit_test(test_scenes_do_not_disturb_each_other),
         cmocka_unit_test(test_packets_agree_with_single_rays),
+        cmocka_unit_test(test_packets_to_one_light),
         cmocka_unit_test(test_bounds_hold_what_moves),
         cmocka_unit_test(test_what_is_no_place_is_refused),
     };
