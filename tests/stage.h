@@ -9,7 +9,7 @@
 
 #include "server/render/render.h"
 
-#define GN_TEST_STAGE_MAX 16
+#define GN_TEST_STAGE_MAX 96
 
 /** Caller's memory; zero it, add, commit, render, finish. */
 struct gn_test_stage {

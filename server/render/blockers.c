@@ -4,38 +4,46 @@
 
 #include <math.h>
 
-/** World box of an object's vertices, rounded as rt rounds them. */
-static void grow_by_object(const struct gn_scene_object *object, struct box *box)
+int gn_blockers_make(const struct gn_scene *scene, struct blockers *out)
 {
-    const double *m = object->world_from_object;
-    for (int i = 0; i < object->mesh.n_vertices; i++) {
-        const float *p = object->mesh.positions + 3 * (size_t)i;
-        for (int k = 0; k < 3; k++) {
-            const double *row = m + 4 * k;
-            float x = (float)(row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
-            box->min[k] = fminf(box->min[k], x);
-            box->max[k] = fmaxf(box->max[k], x);
-        }
-    }
-}
-
-int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static MAX_BLOCKERS])
-{
+    struct movers *movers = &out->movers;
     int n_real = 0;
+    int ret = gn_movers_make(scene, GN_RT_REAL, movers);
     for (int i = 0; i < scene->n_objects; i++)
         n_real += scene->objects[i].role == GN_RT_REAL;
-    int n = n_real < MAX_BLOCKERS ? n_real : MAX_BLOCKERS;
-    for (int i = 0; i < n; i++)
-        out_boxes[i] =
-            (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int i = 0, real = 0; i < scene->n_objects; i++) {
-        if (scene->objects[i].role != GN_RT_REAL)
+    out->n = n_real < MAX_BLOCKERS ? n_real : MAX_BLOCKERS;
+    for (int i = 0, real = 0; i < scene->n_objects && ret == 0; i++) {
+        const struct gn_scene_object *object = &scene->objects[i];
+        if (object->role != GN_RT_REAL)
             continue;
         // More objects than boxes: neighbours in the list share one.
-        grow_by_object(&scene->objects[i], &out_boxes[(int64_t)real * n / n_real]);
-        real++;
+        int group = (int)((int64_t)real++ * out->n / n_real);
+        if (object->is_movable)
+            movers->mover[gn_movers_find(movers, i)].group = group;
+        for (int v = 0; v < object->mesh.n_vertices && !object->is_movable; v++) {
+            float p[3];
+            gn_movers_get_vertex(object, object->mesh.positions + 3 * (size_t)v, p);
+            gn_box_grow(&movers->resting[group], p);
+        }
     }
-    return n;
+    if (ret == 0)
+        gn_blockers_pose(out, scene);
+    return ret;
+}
+
+void gn_blockers_finish(struct blockers *blockers)
+{
+    gn_movers_finish(&blockers->movers);
+}
+
+void gn_blockers_pose(struct blockers *blockers, const struct gn_scene *scene)
+{
+    const struct movers *movers = &blockers->movers;
+    for (int i = 0; i < blockers->n; i++)
+        blockers->boxes[i] = movers->resting[i];
+    for (int i = 0; i < movers->n; i++)
+        (void)gn_movers_grow_box(&movers->mover[i], scene,
+                                 &blockers->boxes[movers->mover[i].group]);
 }
 
 /** True where the box lies under the planes through all wanted receivers' ray origins: no ray that

@@ -3,7 +3,8 @@
 /*
  * Clusters of triangles: what may stand in a ray's way, coarse enough to ask for every receiver.
  * Each set begins with one cluster for each object; the one with the most triangles is cut in two
- * at the middle of its centroids until there are enough.
+ * at the middle of its centroids until there are enough. Those of movable objects are made in mesh
+ * coordinates and taken to where the objects stand.
  */
 #include "server/render/internal.h"
 
@@ -15,9 +16,6 @@
 // Clusters of fewer triangles are not cut.
 #define MIN_TRIANGLES 8
 
-static const struct box empty_box = {{INFINITY, INFINITY, INFINITY},
-                                     {-INFINITY, -INFINITY, -INFINITY}};
-
 /** A triangle on its way into a cluster. */
 struct member {
     int object, triangle;
@@ -26,25 +24,27 @@ struct member {
 /** Clusters in the making: ranges of members. */
 struct build {
     const struct gn_scene *scene;
+    const struct movers *movers;
     struct member *members; // of one set, owned
     int n;
     int first[MAX_CLUSTERS], size[MAX_CLUSTERS];
+    int mover[MAX_CLUSTERS];     // as cluster.mover
     bool is_whole[MAX_CLUSTERS]; // cannot be cut
     int part[MAX_CLUSTERS];      // the cluster that it was cut from at first
 };
 
-/** World corners of a triangle, rounded as rt rounds them. */
+/** Corners of a triangle: world, rounded as rt rounds them; of a movable object: mesh coordinates.
+ */
 static void get_corners(const struct gn_scene *scene, struct member member, float out[3][3])
 {
     const struct gn_scene_object *object = &scene->objects[member.object];
-    const double *m = object->world_from_object;
     for (int i = 0; i < 3; i++) {
         size_t index = object->mesh.triangles[3 * (size_t)member.triangle + (size_t)i];
         const float *p = object->mesh.positions + 3 * index;
-        for (int k = 0; k < 3; k++) {
-            const double *row = m + 4 * k;
-            out[i][k] = (float)(row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
-        }
+        if (object->is_movable)
+            memcpy(out[i], p, sizeof(out[i]));
+        else
+            gn_movers_get_vertex(object, p, out[i]);
     }
 }
 
@@ -61,7 +61,7 @@ static bool cut(struct build *build, int c, int other)
 {
     struct member *members = build->members + build->first[c];
     int n = build->size[c];
-    struct box box = empty_box;
+    struct box box = EMPTY_BOX;
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++) {
             float x = get_centre(build->scene, members[i], k);
@@ -86,6 +86,7 @@ static bool cut(struct build *build, int c, int other)
     if (n_near == 0 || n_near == n)
         return false;
     build->size[c] = n_near;
+    build->mover[other] = build->mover[c];
     build->first[other] = build->first[c] + n_near;
     build->size[other] = n - n_near;
     build->part[other] = build->part[c];
@@ -117,8 +118,14 @@ static int gather(struct build *build, enum gn_rt_set role)
         if (scene->objects[i].role != role)
             continue;
         int c = (int)((int64_t)rank++ * n_clusters / n_objects);
-        if (build->size[c] == 0)
+        int mover = gn_movers_find(build->movers, i);
+        if (build->size[c] == 0) {
             build->first[c] = build->n;
+            build->mover[c] = mover < 0 ? CLUSTER_RESTS : mover;
+        } else if (mover >= 0 || build->mover[c] != CLUSTER_RESTS) {
+            build->mover[c] = CLUSTER_MIXED;
+            build->is_whole[c] = true;
+        }
         build->size[c] += scene->objects[i].mesh.n_triangles;
         for (int t = 0; t < scene->objects[i].mesh.n_triangles; t++)
             build->members[build->n++] = (struct member){i, t};
@@ -183,49 +190,90 @@ static int cut_all(struct build *build, int n_clusters)
 }
 
 /** Corners of a box in place of the vertices. */
-static void keep_box(const struct box *box, struct clusters *out)
+static void set_corners(const struct box *box, float *const vertices[static 3], int first)
 {
     for (int corner = 0; corner < 8; corner++) {
         for (int k = 0; k < 3; k++)
-            out->vertices[k][out->n_vertices] = corner >> k & 1 ? box->max[k] : box->min[k];
-        out->n_vertices++;
+            vertices[k][first + corner] = corner >> k & 1 ? box->max[k] : box->min[k];
     }
 }
 
 static void fill_cluster(const struct build *build, int c, struct clusters *out)
 {
     struct cluster *cluster = &out->cluster[out->n++];
-    cluster->box = empty_box;
+    bool keeps = build->size[c] <= CLUSTER_TRIANGLES && build->mover[c] != CLUSTER_MIXED;
+    cluster->box = EMPTY_BOX;
+    cluster->mover = build->mover[c];
     cluster->first_vertex = out->n_vertices;
-    bool keeps = build->size[c] <= CLUSTER_TRIANGLES;
     for (int i = 0; i < build->size[c]; i++) {
+        struct member member = build->members[build->first[c] + i];
         float p[3][3];
-        get_corners(build->scene, build->members[build->first[c] + i], p);
-        for (int j = 0; j < 9; j++) {
-            float x = p[j / 3][j % 3];
-            cluster->box.min[j % 3] = fminf(cluster->box.min[j % 3], x);
-            cluster->box.max[j % 3] = fmaxf(cluster->box.max[j % 3], x);
-            if (keeps)
-                out->vertices[j % 3][out->n_vertices + j / 3] = x;
+        if (cluster->mover == CLUSTER_MIXED && build->scene->objects[member.object].is_movable)
+            continue; // its box is there
+        get_corners(build->scene, member, p);
+        for (int j = 0; j < 3; j++) {
+            gn_box_grow(&cluster->box, p[j]);
+            for (int k = 0; k < 3 && keeps; k++)
+                out->vertices[k][out->n_vertices + j] = p[j][k];
         }
         out->n_vertices += keeps ? 3 : 0;
     }
-    if (!keeps)
-        keep_box(&cluster->box, out);
+    if (!keeps) {
+        set_corners(&cluster->box, out->vertices, out->n_vertices);
+        out->n_vertices += 8;
+    }
     cluster->has_edges = keeps;
     cluster->is_flat = out->is_flat[build->part[c]];
     cluster->n_vertices = out->n_vertices - cluster->first_vertex;
 }
 
+static int reserve_vertices(float *vertices[static 3])
+{
+    for (int k = 0; k < 3; k++) {
+        vertices[k] = malloc(MAX_CLUSTERS * 3 * CLUSTER_TRIANGLES * sizeof(float));
+        if (!vertices[k])
+            return -ENOMEM;
+    }
+    return 0;
+}
+
+/** Keeps what movers' clusters are made of, and takes them to where they stand. */
+static int set_in_motion(const struct build *build, struct clusters *clusters)
+{
+    if (clusters->movers.n == 0)
+        return 0;
+    if (reserve_vertices(clusters->own_vertices) < 0)
+        return -ENOMEM;
+    for (int k = 0; k < 3; k++)
+        memcpy(clusters->own_vertices[k], clusters->vertices[k],
+               (size_t)clusters->n_vertices * sizeof(float));
+    for (int c = 0; c < clusters->n; c++) {
+        if (clusters->cluster[c].mover != CLUSTER_MIXED)
+            continue;
+        clusters->movers.resting[c] = clusters->cluster[c].box;
+        const struct member *members = build->members + build->first[c];
+        for (int i = 0; i < build->size[c]; i++) {
+            if (i > 0 && members[i].object == members[i - 1].object)
+                continue;
+            int mover = gn_movers_find(&clusters->movers, members[i].object);
+            if (mover >= 0)
+                clusters->movers.mover[mover].group = c;
+        }
+    }
+    gn_clusters_pose(clusters, build->scene);
+    return 0;
+}
+
 int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct clusters *out)
 {
     struct build *build = calloc(1, sizeof(*build));
-    int ret = -ENOMEM;
     memset(out, 0, sizeof(*out));
-    if (!build)
+    int ret = build ? gn_movers_make(scene, role, &out->movers) : -ENOMEM;
+    if (ret < 0)
         goto out;
     out->role = role;
     build->scene = scene;
+    build->movers = &out->movers;
     ret = gather(build, role);
     if (ret < 0)
         goto out;
@@ -234,20 +282,16 @@ int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct c
         out->is_flat[c] = is_flat(build, c);
     }
     int n_clusters = cut_all(build, ret);
-    for (int k = 0; k < 3; k++) {
-        out->vertices[k] = malloc(MAX_CLUSTERS * 3 * CLUSTER_TRIANGLES * sizeof(float));
-        if (!out->vertices[k]) {
-            gn_clusters_finish(out);
-            ret = -ENOMEM;
-            goto out;
-        }
-    }
-    for (int c = 0; c < n_clusters; c++)
+    ret = reserve_vertices(out->vertices);
+    for (int c = 0; c < n_clusters && ret == 0; c++)
         fill_cluster(build, c, out);
-    ret = gn_edges_make(out);
+    if (ret == 0)
+        ret = gn_edges_make(out);
+    if (ret == 0)
+        ret = set_in_motion(build, out);
+out:
     if (ret < 0)
         gn_clusters_finish(out);
-out:
     if (build)
         free(build->members);
     free(build);
@@ -256,10 +300,57 @@ out:
 
 void gn_clusters_finish(struct clusters *clusters)
 {
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         free(clusters->vertices[k]);
+        free(clusters->own_vertices[k]);
+    }
     free(clusters->edges);
+    gn_movers_finish(&clusters->movers);
     memset(clusters, 0, sizeof(*clusters));
+}
+
+/** A mover's cluster to where its object stands. */
+static void pose_cluster(struct clusters *clusters, struct cluster *cluster,
+                         const struct gn_scene_object *object)
+{
+    cluster->box = EMPTY_BOX;
+    for (int i = cluster->first_vertex; i < cluster->first_vertex + cluster->n_vertices; i++) {
+        const float own[3] = {clusters->own_vertices[0][i], clusters->own_vertices[1][i],
+                              clusters->own_vertices[2][i]};
+        float p[3];
+        gn_movers_get_vertex(object, own, p);
+        gn_box_grow(&cluster->box, p);
+        for (int k = 0; k < 3; k++)
+            clusters->vertices[k][i] = p[k];
+    }
+}
+
+void gn_clusters_pose(struct clusters *clusters, const struct gn_scene *scene)
+{
+    const struct movers *movers = &clusters->movers;
+    if (movers->n == 0)
+        return;
+    for (int c = 0; c < clusters->n; c++) {
+        struct cluster *cluster = &clusters->cluster[c];
+        if (cluster->mover == CLUSTER_MIXED) {
+            cluster->box = movers->resting[c];
+        } else if (cluster->mover >= 0) {
+            const struct mover *mover = &movers->mover[cluster->mover];
+            struct box box = EMPTY_BOX;
+            cluster->slack = gn_movers_grow_box(mover, scene, &box);
+            pose_cluster(clusters, cluster, &scene->objects[mover->object]);
+        }
+    }
+    for (int i = 0; i < movers->n; i++) {
+        int group = movers->mover[i].group;
+        if (group >= 0) // the slack is in the box
+            (void)gn_movers_grow_box(&movers->mover[i], scene, &clusters->cluster[group].box);
+    }
+    for (int c = 0; c < clusters->n; c++) {
+        if (clusters->cluster[c].mover == CLUSTER_MIXED)
+            set_corners(&clusters->cluster[c].box, clusters->vertices,
+                        clusters->cluster[c].first_vertex);
+    }
 }
 
 /** True where the whole cluster lies in or under the plane through org across n. */
@@ -273,7 +364,7 @@ static bool is_under(const struct clusters *clusters, const struct cluster *clus
         double height = (double)n[0] * ((double)x[i] - org[0]) +
                         (double)n[1] * ((double)y[i] - org[1]) +
                         (double)n[2] * ((double)z[i] - org[2]);
-        if (height > 0)
+        if (height > -(double)cluster->slack)
             return false;
     }
     return true;

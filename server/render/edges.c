@@ -19,8 +19,9 @@
 /** One side of a triangle; ends are in order, so that the other triangle's side compares equal. */
 struct side {
     float ends[6];
-    float apex[3];
+    int end[2], apex; // vertices
     int cluster;
+    int mover; // only what moves together stays together
 };
 
 static int compare_sides(const void *a, const void *b)
@@ -31,7 +32,7 @@ static int compare_sides(const void *a, const void *b)
         if (x->ends[i] != y->ends[i])
             return x->ends[i] < y->ends[i] ? -1 : 1;
     }
-    return 0;
+    return (x->mover > y->mover) - (x->mover < y->mover);
 }
 
 static int compare_edges(const void *a, const void *b)
@@ -55,17 +56,21 @@ static void add_sides(const struct clusters *clusters, int c, struct side **next
     const struct cluster *cluster = &clusters->cluster[c];
     for (int i = 0; i < cluster->n_vertices; i++) {
         float p[3][3];
+        int vertex[3];
         for (int j = 0; j < 3; j++) {
-            int vertex = cluster->first_vertex + i / 3 * 3 + (i + j) % 3;
+            vertex[j] = cluster->first_vertex + i / 3 * 3 + (i + j) % 3;
             for (int k = 0; k < 3; k++)
-                p[j][k] = clusters->vertices[k][vertex];
+                p[j][k] = clusters->vertices[k][vertex[j]];
         }
-        bool is_ordered = comes_first(p[0], p[1]);
+        int first = comes_first(p[0], p[1]) ? 0 : 1;
         struct side *side = (*next)++;
-        memcpy(side->ends, p[is_ordered ? 0 : 1], sizeof(p[0]));
-        memcpy(side->ends + 3, p[is_ordered ? 1 : 0], sizeof(p[0]));
-        memcpy(side->apex, p[2], sizeof(p[2]));
+        memcpy(side->ends, p[first], sizeof(p[0]));
+        memcpy(side->ends + 3, p[1 - first], sizeof(p[0]));
+        side->end[0] = vertex[first];
+        side->end[1] = vertex[1 - first];
+        side->apex = vertex[2];
         side->cluster = c;
+        side->mover = cluster->mover;
     }
 }
 
@@ -77,9 +82,9 @@ static int pair_sides(const struct side *sides, int n, struct edge *out)
         for (end = i + 1; end < n && compare_sides(&sides[i], &sides[end]) == 0; end++)
             continue;
         struct edge *edge = &out[n_edges++];
-        memcpy(edge->ends, sides[i].ends, sizeof(edge->ends));
-        memcpy(edge->apex[0], sides[i].apex, sizeof(edge->apex[0]));
-        memcpy(edge->apex[1], sides[end - 1].apex, sizeof(edge->apex[1]));
+        memcpy(edge->ends, sides[i].end, sizeof(edge->ends));
+        edge->apex[0] = sides[i].apex;
+        edge->apex[1] = sides[end - 1].apex;
         edge->has_two = end - i == 2;
         edge->cluster = sides[i].cluster;
     }
@@ -121,12 +126,20 @@ static double dot(const double a[static 3], const double b[static 3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/** A vertex relative to org. */
+static void get_vertex(const struct clusters *clusters, int vertex, const float org[static 3],
+                       double out[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)clusters->vertices[k][vertex] - org[k];
+}
+
 /** -1, 0, 1: the side of the plane that the apex lies on; 0: not sure. */
-static int get_side(const double plane[static 3], const float apex[static 3],
+static int get_side(const struct clusters *clusters, const double plane[static 3], int apex,
                     const float org[static 3])
 {
-    const double p[3] = {(double)apex[0] - org[0], (double)apex[1] - org[1],
-                         (double)apex[2] - org[2]};
+    double p[3];
+    get_vertex(clusters, apex, org, p);
     double x = dot(plane, p);
     double limit = EDGE_ON * sqrt(dot(plane, plane) * dot(p, p));
     return (x > limit) - (x < -limit);
@@ -138,13 +151,15 @@ int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster
     int n = 0;
     for (int i = 0; i < cluster->n_edges; i++) {
         const struct edge *edge = &clusters->edges[cluster->first_edge + i];
-        const float *e = edge->ends;
-        const double a[3] = {(double)e[0] - org[0], (double)e[1] - org[1], (double)e[2] - org[2]};
-        const double b[3] = {(double)e[3] - org[0], (double)e[4] - org[1], (double)e[5] - org[2]};
+        double a[3];
+        double b[3];
+        get_vertex(clusters, edge->ends[0], org, a);
+        get_vertex(clusters, edge->ends[1], org, b);
         const double plane[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
                                  a[0] * b[1] - a[1] * b[0]};
-        if (edge->has_two &&
-            get_side(plane, edge->apex[0], org) * get_side(plane, edge->apex[1], org) < 0)
+        if (edge->has_two && get_side(clusters, plane, edge->apex[0], org) *
+                                     get_side(clusters, plane, edge->apex[1], org) <
+                                 0)
             continue;
         // Not to unit length: where the point is nearly in line with the edge, all is near it.
         double length = sqrt(dot(a, a) * dot(b, b));

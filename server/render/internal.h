@@ -114,17 +114,38 @@ struct places {
 
 /** Some triangles that are near each other. */
 struct cluster {
-    struct box box;               // exact
+    struct box box;               // exact but for slack
     int first_vertex, n_vertices; // three for each triangle; of many triangles: the box's corners
-    bool has_edges;               // false: of too many triangles
+    bool has_edges;               // false: of too many triangles, or of several that move
     bool is_flat;                 // of one object, which lies in one plane
     int first_edge, n_edges;
+    int mover;   // of whose triangles it is; CLUSTER_RESTS, CLUSTER_MIXED
+    float slack; // m, by which rounding may put what is traced elsewhere; 0 where all rests
 };
 
-/** An edge and what its triangles have beside it. */
+/** All of it rests. */
+#define CLUSTER_RESTS (-1)
+/** Several objects, of which some move: a box about them. */
+#define CLUSTER_MIXED (-2)
+
+/** A movable object. */
+struct mover {
+    int object;
+    int group;      // the box it shares with others; -1: none
+    struct box own; // of its vertices, mesh coordinates
+};
+
+/** Movable objects of a role and the boxes that they share with others. */
+struct movers {
+    int n;
+    struct mover *mover;              // [n], owned
+    struct box resting[MAX_CLUSTERS]; // by group: of what rests in it; min > max: nothing
+};
+
+/** An edge and what its triangles have beside it: indices of the clusters' vertices. */
 struct edge {
-    float ends[6];
-    float apex[2][3];
+    int ends[2];
+    int apex[2];
     bool has_two; // triangles; else one, or more than two, and apex says nothing
     int cluster;
 };
@@ -156,8 +177,17 @@ struct clusters {
     struct cluster cluster[MAX_CLUSTERS];
     int n_vertices;
     float *vertices[3];         // world, owned
+    float *own_vertices[3];     // of movers': mesh coordinates, owned; NULL where nothing moves
     bool is_flat[MAX_CLUSTERS]; // of the objects' first clusters, which are also the blockers
     struct edge *edges;         // owned; an edge of triangles of two clusters is in one of them
+    struct movers movers;
+};
+
+/** Boxes of the real objects, each in one. */
+struct blockers {
+    int n;
+    struct box boxes[MAX_BLOCKERS]; // exact; of what moves, widened by its slack
+    struct movers movers;           // group: index of the box
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -358,12 +388,32 @@ void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, 
 
 /* blockers.c */
 
-/** Boxes of the real objects, each in one. Returns their number. */
-int gn_blockers_make(const struct gn_scene *scene, struct box out_boxes[static MAX_BLOCKERS]);
+/** Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_blockers_make(const struct gn_scene *scene, struct blockers *out);
+void gn_blockers_finish(struct blockers *blockers);
+/** Follows the movable objects to where they stand in a snapshot of the scene. */
+void gn_blockers_pose(struct blockers *blockers, const struct gn_scene *scene);
 /** Those of the frame's (widened) that do not lie wholly under the planes through all wanted
  * receivers' ray origins: no ray that leaves upwards meets the others. Returns their number. */
 int gn_blockers_list_above(const struct frame *frame, const struct receivers *receivers,
                            const struct box *out_boxes[static MAX_BLOCKERS]);
+
+/* movers.c */
+
+#define EMPTY_BOX ((struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}})
+
+/** Lists the movable objects of a role; all groups are -1 and empty. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_movers_make(const struct gn_scene *scene, enum gn_rt_set role,
+                               struct movers *out);
+void gn_movers_finish(struct movers *movers);
+/** Index of the object's mover; -1: it rests. */
+int gn_movers_find(const struct movers *movers, int object);
+/** World vertex of a mesh, rounded as rt rounds it. */
+void gn_movers_get_vertex(const struct gn_scene_object *object, const float p[static 3],
+                          float out[static 3]);
+/** Grows box by the world box of a mover where it stands in the scene, and returns its slack. */
+float gn_movers_grow_box(const struct mover *mover, const struct gn_scene *scene, struct box *box);
+void gn_box_grow(struct box *box, const float p[static 3]);
 
 /* clusters.c */
 
@@ -371,6 +421,8 @@ int gn_blockers_list_above(const struct frame *frame, const struct receivers *re
 GN_MUST_USE int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role,
                                  struct clusters *out);
 void gn_clusters_finish(struct clusters *clusters);
+/** Follows the movable objects to where they stand in a snapshot of the scene; O(clusters). */
+void gn_clusters_pose(struct clusters *clusters, const struct gn_scene *scene);
 /** Adds to out[n] and their outlines the clusters that are not wholly in or under the plane through
  * org: no ray that leaves upwards meets the others. Returns the new n. */
 int gn_clusters_list_above(const struct clusters *clusters, const float org[static 3],

@@ -111,6 +111,12 @@ struct gn_renderer;
 /** scene is borrowed until the renderer is destroyed; pool too (may be NULL). */
 GN_MUST_USE int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
                                    struct gn_renderer **out_renderer, struct gn_error *out_error);
+/**
+ * Renders from now on the scene's movable objects where a snapshot of the scene (scene/motion.h),
+ * or the scene itself, has them. posed is borrowed until the next call, or destroy. Costs O(movable
+ * objects): clusters of triangles and boxes follow.
+ */
+void gn_renderer_set_scene(struct gn_renderer *renderer, const struct gn_scene *posed);
 /** NULL-safe; nulls *renderer. */
 void gn_renderer_destroy(struct gn_renderer **renderer);
 

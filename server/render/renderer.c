@@ -19,6 +19,8 @@
 
 struct gn_renderer {
     const struct gn_scene *scene; // borrowed
+    const struct gn_scene *posed; // borrowed: where its movable objects stand
+    uint64_t version;             // of the scene that the boxes are of
     struct gn_pool *pool;         // borrowed, may be NULL
     int n_workers;
     struct scratch *scratches; // [n_workers], owned
@@ -31,8 +33,8 @@ struct gn_renderer {
     struct tile_figures *figures;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
     double slopes[4];
-    struct box blockers[MAX_BLOCKERS], wide_blockers[MAX_BLOCKERS]; // [n_blockers]
-    int n_blockers;
+    struct blockers blockers;
+    struct box wide_blockers[MAX_BLOCKERS];
     struct clusters clusters[2]; // real, virtual
     struct silhouettes silhouettes[2];
 };
@@ -44,7 +46,8 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
     struct gn_renderer *renderer = calloc(1, sizeof(*renderer));
     if (!renderer)
         return gn_error_set(out_error, -ENOMEM, "renderer: out of memory");
-    renderer->scene = scene;
+    renderer->scene = renderer->posed = scene;
+    renderer->version = scene->version;
     renderer->pool = pool;
     renderer->n_workers = pool ? gn_pool_get_size(pool) : 1;
     // Packets want the alignment of their type.
@@ -56,13 +59,11 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
                             pool ? gn_pool_get_size(pool) : 1);
     }
     memset(renderer->scratches, 0, bytes);
-    renderer->n_blockers = gn_blockers_make(scene, renderer->blockers);
-    for (int i = 0; i < 2; i++) {
-        static const enum gn_rt_set roles[2] = {GN_RT_REAL, GN_RT_VIRTUAL};
-        if (gn_clusters_make(scene, roles[i], &renderer->clusters[i]) < 0) {
-            gn_renderer_destroy(&renderer);
-            return gn_error_set(out_error, -ENOMEM, "renderer: no memory for the scene's boxes");
-        }
+    if (gn_blockers_make(scene, &renderer->blockers) < 0 ||
+        gn_clusters_make(scene, GN_RT_REAL, &renderer->clusters[0]) < 0 ||
+        gn_clusters_make(scene, GN_RT_VIRTUAL, &renderer->clusters[1]) < 0) {
+        gn_renderer_destroy(&renderer);
+        return gn_error_set(out_error, -ENOMEM, "renderer: no memory for the scene's boxes");
     }
     *out_renderer = renderer;
     return 0;
@@ -83,6 +84,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
         gn_clusters_finish(&self->clusters[i]);
         gn_silhouettes_finish(&self->silhouettes[i]);
     }
+    gn_blockers_finish(&self->blockers);
     gn_render_lights_finish(&self->lights);
     gn_near_store_finish(&self->near);
     gn_places_finish(&self->places);
@@ -90,6 +92,21 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     free(self->features);
     free(self->figures);
     free(self);
+}
+
+void gn_renderer_set_scene(struct gn_renderer *renderer, const struct gn_scene *posed)
+{
+    renderer->posed = posed;
+    if (posed->version == renderer->version)
+        return;
+    renderer->version = posed->version;
+    gn_blockers_pose(&renderer->blockers, posed);
+    for (int i = 0; i < 2; i++) {
+        if (renderer->clusters[i].movers.n == 0)
+            continue;
+        gn_clusters_pose(&renderer->clusters[i], posed);
+        gn_silhouettes_forget(&renderer->silhouettes[i]);
+    }
 }
 
 static int count_tiles(int side)
@@ -229,13 +246,13 @@ static void init_boxes(struct frame *frame, struct gn_renderer *renderer)
     frame->margin = 1e-5f * largest;
     frame->clusters = renderer->clusters;
     widen_box(&frame->virtual_box, frame->margin);
-    for (int i = 0; i < renderer->n_blockers; i++) {
-        renderer->wide_blockers[i] = renderer->blockers[i];
+    for (int i = 0; i < renderer->blockers.n; i++) {
+        renderer->wide_blockers[i] = renderer->blockers.boxes[i];
         widen_box(&renderer->wide_blockers[i], frame->margin);
     }
-    frame->blockers = renderer->blockers;
+    frame->blockers = renderer->blockers.boxes;
     frame->wide_blockers = renderer->wide_blockers;
-    frame->n_blockers = renderer->n_blockers;
+    frame->n_blockers = renderer->blockers.n;
 }
 
 static void init_light(struct frame *frame)
@@ -257,8 +274,8 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
             frame->world_from_camera[3 * i + k] = m[4 * i + k];
         frame->origin[i] = (float)m[4 * i + 3];
     }
-    frame->scene = renderer->scene;
-    frame->rt = renderer->scene->rt;
+    frame->scene = renderer->posed;
+    frame->rt = renderer->posed->rt;
     frame->kernels = gn_kernels_get();
     frame->rays = renderer->rays;
     frame->lights = &renderer->lights;

@@ -143,12 +143,6 @@ static void draw_segment(const float a[static 2], const float b[static 2],
     }
 }
 
-static void get_cell(const struct silhouette *s, const float p[static 3], float out[static 2])
-{
-    for (int i = 0; i < 2; i++)
-        out[i] = dot3(s->axis[i], p) + s->offset[i];
-}
-
 /** Side of the line through a and b that the apex lies on; 0: so near to it that rounding may say
  * either. */
 static int get_side(const float a[static 2], const float b[static 2], const float apex[static 2],
@@ -162,15 +156,16 @@ static int get_side(const float a[static 2], const float b[static 2], const floa
 }
 
 static void draw_edges(const struct clusters *clusters, const struct cluster *cluster,
-                       const float half[static 2], struct silhouette *s)
+                       const struct projected *projected, const float half[static 2],
+                       struct silhouette *s)
 {
     for (int i = 0; i < cluster->n_edges; i++) {
         const struct edge *edge = &clusters->edges[cluster->first_edge + i];
         float ends[2][2];
         float apex[2][2];
-        for (int j = 0; j < 2; j++) {
-            get_cell(s, edge->ends + 3 * j, ends[j]);
-            get_cell(s, edge->apex[j], apex[j]);
+        for (int j = 0; j < 4; j++) {
+            ends[j / 2][j % 2] = projected->at[j % 2][edge->ends[j / 2]];
+            apex[j / 2][j % 2] = projected->at[j % 2][edge->apex[j / 2]];
         }
         if (!edge->has_two ||
             get_side(ends[0], ends[1], apex[0], half) * get_side(ends[0], ends[1], apex[1], half) >=
@@ -327,7 +322,7 @@ static void make_one(void *context, int item, int worker)
         if (is_left_out(job, cluster))
             continue;
         if (cluster->has_edges)
-            draw_edges(job->clusters, cluster, half, s);
+            draw_edges(job->clusters, cluster, projected, half, s);
         else
             draw_box(&cluster->box, half, s);
     }
