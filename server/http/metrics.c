@@ -41,6 +41,11 @@ GETTER(environment_refused)
 GETTER(emitter_in)
 GETTER(emitter_superseded)
 GETTER(emitter_refused)
+GETTER(n_trackers)
+GETTER(n_movable)
+GETTER(poses_in)
+GETTER(poses_late)
+GETTER(poses_refused)
 GETTER(holdable_fps_room)
 GETTER(light_published)
 GETTER(n_lights)
@@ -86,6 +91,13 @@ static const struct metric metrics[] = {
      "Pictures of emitters that a later one replaced unread.", get_emitter_superseded},
     {"gnomon_emitter_frames_refused_total", "counter", "Pictures of emitters that were bad.",
      get_emitter_refused},
+    {"gnomon_trackers", "gauge", "Trackers in the room.", get_n_trackers},
+    {"gnomon_movable_objects", "gauge", "Objects of the scene that can move.", get_n_movable},
+    {"gnomon_object_poses_received_total", "counter", "Poses of objects received.", get_poses_in},
+    {"gnomon_object_poses_late_total", "counter",
+     "Poses of objects captured no later than the one that was there.", get_poses_late},
+    {"gnomon_object_poses_refused_total", "counter", "Poses of objects that were bad.",
+     get_poses_refused},
     {"gnomon_lighting_states_total", "counter", "Lighting states published.", get_light_published},
     {"gnomon_lights", "gauge", "Lights of the lighting state.", get_n_lights},
     {"gnomon_environment_frames_same_total", "counter",

@@ -31,7 +31,10 @@ static void append(json_t *array, json_t *value, bool *is_short)
 
 static const char *get_role_name(enum gn_msg_role role)
 {
-    return role == GN_MSG_ROLE_PROBE ? "probe" : role == GN_MSG_ROLE_SCREEN ? "screen" : "viewer";
+    return role == GN_MSG_ROLE_PROBE     ? "probe"
+           : role == GN_MSG_ROLE_SCREEN  ? "screen"
+           : role == GN_MSG_ROLE_TRACKER ? "tracker"
+                                         : "viewer";
 }
 
 static json_t *make_sessions(struct gn_room *room, bool *is_short)
@@ -44,13 +47,13 @@ static json_t *make_sessions(struct gn_room *room, bool *is_short)
     for (int i = 0; i < n; i++) {
         const struct gn_session_figures *s = &sessions[i];
         append(list,
-               json_pack("{s:I, s:s, s:s, s:s, s:f, s:I, s:I, s:I, s:I, s:f}", //
+               json_pack("{s:I, s:s, s:s, s:s, s:f, s:I, s:I, s:I, s:I, s:I, s:f}", //
                          "id", (json_int_t)s->id, "role", get_role_name(s->role), "name", s->name,
                          "peer", s->peer, "age_s", get_ms_since(s->since_ns) * 1e-3, //
                          "frames_in", (json_int_t)s->frames_in, "frames_out",
                          (json_int_t)s->frames_out, "frames_dropped", (json_int_t)s->frames_dropped,
-                         "environment_frames_in", (json_int_t)s->environment_in, "last_latency_ms",
-                         s->last_latency_ms),
+                         "environment_frames_in", (json_int_t)s->environment_in, "poses_in",
+                         (json_int_t)s->poses_in, "last_latency_ms", s->last_latency_ms),
                is_short);
     }
     free(sessions);
@@ -72,6 +75,27 @@ static json_t *make_probes(struct gn_room *room, bool *is_short)
                          (json_int_t)p->n_lit, "clipped_texels", p->n_clipped, "mended_texels",
                          p->n_mended, "out_of_gamut_texels", p->n_out_of_gamut, "rate_hz",
                          p->rate_hz, "age_ms", get_ms_since(p->capture_ns)),
+               is_short);
+    }
+    return list;
+}
+
+/** Objects that move, and who moves them. */
+static json_t *make_movable(struct gn_room *room, bool *is_short)
+{
+    struct gn_mover_figures movers[GN_MOVER_FIGURES_MAX];
+    json_t *list = json_array();
+    int n = gn_room_get_movers(room, 0, GN_MOVER_FIGURES_MAX, movers);
+    for (int i = 0; i < n; i++) {
+        const struct gn_mover_figures *m = &movers[i];
+        gn_text_clean(movers[i].name); // the operator's: any bytes
+        append(list,
+               json_pack("{s:s, s:s, s:[f, f, f], s:I, s:f, s:o, s:o}", //
+                         "name", m->name, "role", m->is_virtual ? "virtual" : "real", "position_m",
+                         m->position[0], m->position[1], m->position[2], //
+                         "poses", (json_int_t)m->n_poses, "rate_hz", m->rate_hz, "session",
+                         m->n_poses ? json_integer((json_int_t)m->session_id) : json_null(),
+                         "age_ms", m->n_poses ? json_real(get_ms_since(m->time_ns)) : json_null()),
                is_short);
     }
     return list;
@@ -169,7 +193,7 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
     // clang-format off
     json_t *json = json_pack(
         "{s:s, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I, s:I, s:o, s:I, s:I, s:I,"
-        " s:I, s:I, s:I, s:I, s:i,"
+        " s:I, s:I, s:I, s:I, s:i, s:i, s:I, s:I, s:I, s:o,"
         " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o, s:o}",
         "name", gn_room_get_options(room)->name,
         "scene", "objects", f->n_objects, "real_triangles", f->n_real_triangles,
@@ -184,6 +208,9 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
         "emitter_frames_superseded", (json_int_t)f->emitter_superseded,
         "emitter_frames_refused", (json_int_t)f->emitter_refused,
         "emitter_frames_shown", (json_int_t)f->emitter_shown, "near_lights", f->n_near,
+        "trackers", f->n_trackers, "poses_in", (json_int_t)f->poses_in,
+        "poses_late", (json_int_t)f->poses_late, "poses_refused", (json_int_t)f->poses_refused,
+        "movable", make_movable(room, is_short),
         "latency_ms", "p50", f->latency_p50_ms, "p90", f->latency_p90_ms, "p99", f->latency_p99_ms,
         "busy_p50_ms", f->busy_p50_ms,
         "holdable_fps_640x480", "room", f->holdable_fps_room, "viewer", f->holdable_fps_viewer,

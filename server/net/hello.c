@@ -39,15 +39,11 @@ static int check_hello(const struct gn_msg_hello *hello, struct gn_hello_answer 
                       gn_error_set(error, -EACCES,
                                    "token: this server listens on loopback only and checks none; "
                                    "leave it empty"));
-    if (hello->role == GN_MSG_ROLE_TRACKER)
-        return refuse(answer, GN_MSG_ERROR_CODE_UNSUPPORTED,
-                      gn_error_set(error, -EOPNOTSUPP,
-                                   "role: trackers are not built yet; probe, viewer and "
-                                   "screen are"));
     if (hello->role != GN_MSG_ROLE_PROBE && hello->role != GN_MSG_ROLE_VIEWER &&
-        hello->role != GN_MSG_ROLE_SCREEN)
-        return refuse(answer, GN_MSG_ERROR_CODE_BAD_VALUE,
-                      gn_error_set(error, -EINVAL, "role: probe, viewer and screen are right"));
+        hello->role != GN_MSG_ROLE_SCREEN && hello->role != GN_MSG_ROLE_TRACKER)
+        return refuse(
+            answer, GN_MSG_ERROR_CODE_BAD_VALUE,
+            gn_error_set(error, -EINVAL, "role: probe, viewer, tracker and screen are right"));
     return 0;
 }
 
@@ -70,6 +66,8 @@ static uint32_t get_max_payload(const struct gn_room_options *o, enum gn_msg_rol
         limit = GN_LIMIT_ENVIRONMENT_BYTES;
     } else if (role == GN_MSG_ROLE_SCREEN) {
         bytes = limit = GN_LIMIT_EMITTER_BYTES;
+    } else if (role == GN_MSG_ROLE_TRACKER) {
+        bytes = limit = 0;
     } else {
         bytes =
             (uint64_t)o->max_picture_width * (uint64_t)o->max_picture_height * 3 * GN_LIMIT_VIEWS;

@@ -46,6 +46,8 @@ enum gn_session_action gn_session_get_action(enum gn_session_state state, enum g
     case GN_WIRE_EMITTER_FRAME:
         return role == GN_MSG_ROLE_SCREEN ? GN_SESSION_SERVE : GN_SESSION_REFUSE;
     case GN_WIRE_POSE:
+        return role == GN_MSG_ROLE_VIEWER || role == GN_MSG_ROLE_TRACKER ? GN_SESSION_SERVE
+                                                                         : GN_SESSION_REFUSE;
     case GN_WIRE_CAMERA:
     case GN_WIRE_FRAME:
         return role == GN_MSG_ROLE_VIEWER ? GN_SESSION_SERVE : GN_SESSION_REFUSE;
@@ -111,9 +113,10 @@ static void open_up(struct gn_session *s, const struct gn_msg_hello *hello, int6
     gn_log_limited(&arrivals, GN_LOG_INFO, "%s: session %llu: %s in room %s as %s", s->peer,
                    (unsigned long long)s->id, hello->client_name,
                    gn_room_get_options(s->room)->name,
-                   s->role == GN_MSG_ROLE_PROBE    ? "probe"
-                   : s->role == GN_MSG_ROLE_SCREEN ? "screen"
-                                                   : "viewer");
+                   s->role == GN_MSG_ROLE_PROBE     ? "probe"
+                   : s->role == GN_MSG_ROLE_SCREEN  ? "screen"
+                   : s->role == GN_MSG_ROLE_TRACKER ? "tracker"
+                                                    : "viewer");
 }
 
 static void answer_ping(struct gn_session *s, const struct gn_msg_ping *ping, int64_t now_ns)
@@ -152,13 +155,6 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
         rc = gn_room_put_camera(s->member, &m->camera, &error);
         break;
     case GN_WIRE_POSE:
-        if (m->pose.object[0]) {
-            gn_session_complain(
-                s, GN_MSG_ERROR_CODE_UNSUPPORTED, type, 0,
-                "POSE of an object: moving objects are not built yet; an empty name is the "
-                "viewer's own camera");
-            return;
-        }
         rc = gn_room_put_pose(s->member, &m->pose, &error);
         break;
     case GN_WIRE_FRAME:
@@ -173,7 +169,10 @@ static void serve(struct gn_session *s, uint16_t type, const union gn_wire_messa
     else if (rc == -ENOMEM)
         gn_session_fail(s, GN_MSG_ERROR_CODE_INTERNAL, type, about_id, error.text, now_ns);
     else if (rc < 0)
-        gn_session_complain(s, rc == -EUSERS ? GN_MSG_ERROR_CODE_FULL : GN_MSG_ERROR_CODE_BAD_VALUE,
+        gn_session_complain(s,
+                            rc == -EUSERS       ? GN_MSG_ERROR_CODE_FULL
+                            : rc == -EOPNOTSUPP ? GN_MSG_ERROR_CODE_UNSUPPORTED
+                                                : GN_MSG_ERROR_CODE_BAD_VALUE,
                             type, about_id, error.text);
 }
 
@@ -195,6 +194,7 @@ static void take_message(struct gn_session *s, const struct gn_conn_message *mes
                  : type == GN_WIRE_HELLO      ? "the session is open already"
                  : s->role == GN_MSG_ROLE_PROBE
                      ? "a probe sends ENVIRONMENT_FRAME, PING, PONG and BYE"
+                 : s->role == GN_MSG_ROLE_TRACKER ? "a tracker sends POSE, PING, PONG and BYE"
                  : s->role == GN_MSG_ROLE_SCREEN
                      ? "a screen sends EMITTER_FRAME, PING, PONG and BYE"
                      : "a viewer sends CAMERA, POSE, FRAME, PING, PONG and BYE");

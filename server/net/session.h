@@ -2,7 +2,7 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * One connection's session as a state machine. What may come in which state (EMITTER_FRAME as
- * ENVIRONMENT_FRAME, a screen's):
+ * ENVIRONMENT_FRAME, a screen's; of POSE CAMERA FRAME a tracker's is POSE):
  *
  *   state    | HELLO         | PING PONG | BYE  | ENVIRONMENT_FRAME | POSE CAMERA FRAME | other
  *   ---------+---------------+-----------+------+-------------------+-------------------+------

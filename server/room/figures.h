@@ -28,13 +28,15 @@ struct gn_time_histogram {
 
 /** A room's figures; counters run since it was opened. */
 struct gn_room_figures {
-    int n_viewers, n_probes, n_screens, n_objects, n_real_triangles, n_virtual_triangles;
+    int n_viewers, n_probes, n_screens, n_trackers;
+    int n_objects, n_movable, n_real_triangles, n_virtual_triangles;
     uint64_t frames_in, frames_out, frames_dropped;
     uint64_t dropped_by_reason[GN_MSG_DROP_REASON_INTERNAL + 1]; // by enum gn_msg_drop_reason
     uint64_t environment_in, environment_superseded, environment_refused;
     uint64_t emitter_in, emitter_superseded, emitter_refused, emitter_shown;
-    int n_near;                       // near lights of the state
-    bool has_environment_waiting;     // one is unread: nobody in the room needs light
+    uint64_t poses_in, poses_late, poses_refused; // of objects; late: a newer one was there
+    int n_near;                                   // near lights of the state
+    bool has_environment_waiting;                 // one is unread: nobody in the room needs light
     struct gn_time_histogram latency; // from the last byte received to the answer posted
     struct gn_time_histogram busy;    // the render thread's time
     // Of the last 100 results that did not wait for light, whoever they were for; 0: none yet.
@@ -69,7 +71,7 @@ struct gn_session_figures {
     char name[64];
     char peer[64];
     int64_t since_ns;
-    uint64_t frames_in, frames_out, frames_dropped, environment_in;
+    uint64_t frames_in, frames_out, frames_dropped, environment_in, poses_in;
     double last_latency_ms; // 0: none yet
 };
 
@@ -86,6 +88,19 @@ struct gn_probe_figures {
     int n_mended;       // with a channel that was no light: NaN, infinite, negative
     int n_out_of_gamut; // with a channel that the colour matrix made negative
     double rate_hz; // such frames per second, by the median of the last intervals; 0: not known yet
+};
+
+/** Most movable objects whose figures are read at a time. */
+#define GN_MOVER_FIGURES_MAX 64
+/** What can be read of one movable object. */
+struct gn_mover_figures {
+    char name[64];
+    bool is_virtual;
+    uint64_t session_id; // who sent its newest pose
+    uint64_t n_poses;    // taken; 0: it stands as in the scene
+    int64_t time_ns;     // capture of the newest, server's clock; where n_poses > 0
+    double rate_hz;      // by the median of the last intervals between captures; 0: not known yet
+    double position[3];  // m, world
 };
 
 /** What the network side counts. */

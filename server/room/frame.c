@@ -11,6 +11,7 @@
 #include "common/composite.h"
 #include "common/jpeg.h"
 #include "server/room/buf_pool.h"
+#include "server/scene/motion.h"
 
 /** The buffers of one picture size. */
 struct frame_buffers {
@@ -25,6 +26,8 @@ struct gn_frame_maker {
     const struct gn_room_options *options;
     struct gn_renderer *renderer;
     struct gn_compositor *compositor;
+    struct gn_motion *motion;
+    struct gn_scene_snapshot *snapshot; // a reference: what the renderer shows; NULL: the scene
     struct gn_jpeg *jpeg;
     struct gn_buf_pool *payloads;
     uint64_t n_frames;
@@ -48,6 +51,8 @@ int gn_frame_maker_create(const struct gn_room_options *options, const struct gn
         return gn_error_set(out_error, -ENOMEM, "out of memory");
     m->options = options;
     int rc = gn_renderer_create(scene, options->pool, &m->renderer, out_error);
+    if (rc == 0)
+        rc = gn_motion_create(scene, &m->motion, out_error);
     if (rc < 0)
         goto out;
     rc = gn_compositor_create(options->pool, &m->compositor);
@@ -77,8 +82,23 @@ void gn_frame_maker_destroy(struct gn_frame_maker **maker)
     gn_jpeg_destroy(&m->jpeg);
     gn_compositor_destroy(&m->compositor);
     gn_renderer_destroy(&m->renderer);
+    gn_scene_snapshot_unref(&m->snapshot);
+    gn_motion_destroy(&m->motion);
     free(m);
     *maker = NULL;
+}
+
+int gn_frame_maker_pose(struct gn_frame_maker *maker, const struct gn_pose *poses,
+                        struct gn_error *out_error)
+{
+    struct gn_scene_snapshot *snapshot = NULL;
+    int rc = gn_motion_make_snapshot(maker->motion, poses, &snapshot, out_error);
+    if (rc < 0)
+        return rc;
+    gn_renderer_set_scene(maker->renderer, gn_scene_snapshot_get(snapshot));
+    gn_scene_snapshot_unref(&maker->snapshot);
+    maker->snapshot = snapshot;
+    return 0;
 }
 
 /** The buffers of that size; those that rested longest are given up for a new size. */

@@ -37,6 +37,13 @@ GN_MUST_USE int gn_frame_maker_create(const struct gn_room_options *options,
 void gn_frame_maker_destroy(struct gn_frame_maker **maker);
 
 /**
+ * The frames made from now on show the scene's movable objects at poses[n_movable]. On failure, 0
+ * being success, they show them where they were.
+ */
+GN_MUST_USE int gn_frame_maker_pose(struct gn_frame_maker *maker, const struct gn_pose *poses,
+                                    struct gn_error *out_error);
+
+/**
  * Makes the job's result: fills job->answer and its payload, but does not post it. With a reason in
  * *out_outcome the answer is untouched. Takes memory only where a size is new.
  */

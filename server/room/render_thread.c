@@ -11,12 +11,19 @@
 
 GN_LOG_TOPIC("room");
 
+/** Where movable objects stand, as the frame maker has them. */
+struct poses {
+    uint64_t version;
+    struct gn_pose *poses; // [n_movable], the room's
+};
+
 /** One turn: the frame, the light it is rendered in, and whether somebody looks. */
 struct turn {
     enum gn_scheduler_verdict verdict;
     struct gn_frame_job job;
     struct gn_lighting_state *light; // a reference; NULL: none
     bool is_looked_at;
+    bool has_moved; // since the last turn
 };
 
 /**
@@ -37,11 +44,12 @@ static uint64_t get_light_sequence_locked(struct gn_room *room) GN_REQUIRES(room
 }
 
 /** Waits for a frame whose turn it is. False: the room stops. */
-static bool wait_for_turn(struct gn_room *room, struct turn *out)
+static bool wait_for_turn(struct gn_room *room, struct poses *poses, struct turn *out)
 {
     struct gn_snapshot *unseen = NULL;
     out->verdict = GN_SCHEDULER_NOTHING;
     out->light = NULL;
+    out->has_moved = false;
     gn_mutex_lock(&room->mu);
     while (!room->is_stopping) {
         int64_t now_ns = gn_clock_get_monotonic_ns(), deadline_ns;
@@ -50,6 +58,11 @@ static bool wait_for_turn(struct gn_room *room, struct turn *out)
         out->verdict = gn_scheduler_take(room->scheduler, now_ns, light, &out->job, &deadline_ns);
         if (out->verdict != GN_SCHEDULER_NOTHING) {
             out->light = room->light ? gn_lighting_state_ref(room->light) : NULL;
+            out->has_moved = room->poses.version != poses->version;
+            if (out->has_moved)
+                memcpy(poses->poses, room->poses.poses,
+                       (size_t)room->scene->n_movable * sizeof(*poses->poses));
+            poses->version = room->poses.version;
             out->is_looked_at =
                 room->composite_asked_ns > 0 && now_ns - room->composite_asked_ns < GN_ROOM_LOOK_NS;
             if (!out->is_looked_at) {
@@ -148,11 +161,24 @@ static void take_turn(struct gn_room *room, struct gn_frame_maker *maker, struct
     job->answer = NULL;
 }
 
+/** Moves the objects to where they are said to stand. */
+static void follow(struct gn_room *room, const struct poses *poses)
+{
+    static struct gn_log_limiter limiter = {.burst = 5, .interval_ns = 10 * GN_NS_PER_S};
+    struct gn_error error = {0};
+    if (gn_frame_maker_pose(room->maker, poses->poses, &error) < 0)
+        gn_log_limited(&limiter, GN_LOG_WARN, "room %s: objects stay where they are: %s",
+                       room->name, error.text);
+}
+
 void gn_room_run_render(void *context)
 {
     struct gn_room *room = context;
+    struct poses poses = {.poses = room->render_poses};
     struct turn turn;
-    while (wait_for_turn(room, &turn)) {
+    while (wait_for_turn(room, &poses, &turn)) {
+        if (turn.has_moved)
+            follow(room, &poses);
         take_turn(room, room->maker, &turn);
         gn_lighting_state_unref(&turn.light);
     }

@@ -62,6 +62,7 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
         goto out;
     }
     room->figures.n_objects = room->scene->n_objects;
+    room->figures.n_movable = room->scene->n_movable;
     room->figures.n_real_triangles = room->scene->n_real_triangles;
     room->figures.n_virtual_triangles = room->scene->n_virtual_triangles;
     if (room->scene->model == GN_MODEL_GLOBAL)
@@ -75,6 +76,11 @@ int gn_room_create(const struct gn_room_options *options, struct gn_room **out_r
     rc = gn_emitters_create(room->scene, &room->options.emitters, &room->emitters, &scene_error);
     if (rc == 0)
         rc = gn_screens_init(&room->screens, room->emitters);
+    if (rc == 0)
+        rc = gn_poses_init(&room->poses, room->scene);
+    room->render_poses = calloc((size_t)room->scene->n_movable + 1, sizeof(*room->render_poses));
+    if (rc == 0 && !room->render_poses)
+        rc = -ENOMEM;
     if (rc < 0) {
         gn_error_set(out_error, rc, "room %s: %s", room->name,
                      scene_error.text[0] ? scene_error.text : "out of memory");
@@ -112,6 +118,8 @@ void gn_room_destroy(struct gn_room **room)
     gn_thread_join(&r->render_thread);
     gn_probes_finish(&r->probes);
     gn_screens_finish(&r->screens);
+    gn_poses_finish(&r->poses);
+    free(r->render_poses);
     gn_emitters_destroy(&r->emitters);
     gn_lighting_state_unref(&r->light);
     gn_snapshot_unref(&r->composite);
@@ -171,6 +179,7 @@ int gn_room_join(struct gn_room *room, const struct gn_room_member *member,
             gn_probes_owe(&room->probes);
         room->n_probes += s->role == GN_MSG_ROLE_PROBE;
         room->n_screens += s->role == GN_MSG_ROLE_SCREEN;
+        room->n_trackers += s->role == GN_MSG_ROLE_TRACKER;
         room->n_subscribers += s->want_lighting_states;
         gn_cond_signal(&room->light_wake);
     }
@@ -201,6 +210,7 @@ void gn_room_leave(struct gn_room_session **session)
     room->n_viewers -= s->role == GN_MSG_ROLE_VIEWER;
     room->n_probes -= s->role == GN_MSG_ROLE_PROBE;
     room->n_screens -= s->role == GN_MSG_ROLE_SCREEN;
+    room->n_trackers -= s->role == GN_MSG_ROLE_TRACKER;
     room->n_subscribers -= s->want_lighting_states;
     if (s->slot >= 0)
         had_frame = gn_scheduler_remove(room->scheduler, s->slot, &job);
@@ -348,15 +358,6 @@ int gn_room_put_camera(struct gn_room_session *session, const struct gn_msg_came
                             o->max_picture_width, o->max_picture_height);
     int rc = gn_convert_camera(camera, &session->cameras[camera->index], out_error);
     session->has_camera[camera->index] = session->has_camera[camera->index] || rc == 0;
-    return rc;
-}
-
-int gn_room_put_pose(struct gn_room_session *session, const struct gn_msg_pose *pose,
-                     struct gn_error *out_error)
-{
-    int rc = gn_convert_transform(pose->has_world_from_object, &pose->world_from_object,
-                                  &session->world_from_camera, out_error);
-    session->has_pose = session->has_pose || rc == 0;
     return rc;
 }
 

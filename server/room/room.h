@@ -51,7 +51,7 @@ struct gn_room_session;
 /** How a session takes part. */
 struct gn_room_member {
     uint64_t id;           // > 0, never used again
-    enum gn_msg_role role; // PROBE, VIEWER or SCREEN
+    enum gn_msg_role role; // PROBE, VIEWER, SCREEN or TRACKER
     const char *name;      // of the client; copied
     const char *peer;      // its address; copied
     bool want_lighting_states;
@@ -98,7 +98,12 @@ GN_MUST_USE int gn_room_put_emitter(struct gn_room_session *session,
 GN_MUST_USE int gn_room_put_camera(struct gn_room_session *session,
                                    const struct gn_msg_camera *camera, struct gn_error *out_error);
 
-/** Sets the pose that views without their own use. Returns 0, or -EINVAL and a sentence. */
+/**
+ * Of an object: its pose from the next frame on that is begun; one that was captured no later than
+ * the object's last is let go (0 all the same). Without a name: the pose that the viewer's views
+ * without their own use. Returns 0, or -ENOENT (no such movable object), -EINVAL, -EOPNOTSUPP (a
+ * tracker's without a name) and a sentence.
+ */
 GN_MUST_USE int gn_room_put_pose(struct gn_room_session *session, const struct gn_msg_pose *pose,
                                  struct gn_error *out_error);
 
@@ -126,6 +131,10 @@ int gn_room_get_sessions(struct gn_room *room, struct gn_session_figures *out_se
 /** The probes whose light is in the room's; returns how many. */
 int gn_room_get_probes(struct gn_room *room,
                        struct gn_probe_figures out_probes[static GN_PROBES_MAX]);
+
+/** Figures of movable objects from the first on; returns how many. */
+int gn_room_get_movers(struct gn_room *room, int first, int cap,
+                       struct gn_mover_figures *out_movers);
 
 /** The published lighting state, a reference for the caller; NULL: none yet. */
 struct gn_lighting_state *gn_room_get_light(struct gn_room *room);

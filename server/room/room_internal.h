@@ -10,6 +10,7 @@
 #include "common/clock.h"
 #include "common/thread.h"
 #include "server/room/frame.h"
+#include "server/room/poses.h"
 #include "server/room/probes.h"
 #include "server/room/room.h"
 #include "server/room/scheduler.h"
@@ -54,6 +55,7 @@ struct gn_room {
     struct gn_scene *scene;       // owned, immutable
     struct gn_render_needs needs; // what its frames use of a lighting state
     struct gn_frame_maker *maker; // owner: render thread while it runs
+    struct gn_pose *render_poses; // [n_movable], owned; owner: render thread while it runs
     struct gn_emitters *emitters; // owned; owner: light thread while it runs
     struct gn_thread light_thread;
     struct gn_thread render_thread;
@@ -63,10 +65,11 @@ struct gn_room {
     struct gn_cond render_wake; // a frame has come, or light
     bool is_stopping;           // guarded by mu, as all below
     struct gn_room_session *sessions;
-    int n_viewers, n_probes, n_screens, n_subscribers;
+    int n_viewers, n_probes, n_screens, n_trackers, n_subscribers;
     struct gn_scheduler *scheduler;
     struct gn_probes probes;
     struct gn_screens screens;
+    struct gn_poses poses;
     bool is_light_stale;             // a probe has left: the others' lights are to be joined anew;
                                      // or the scene's own light is not shown yet
     bool has_failed_to_complete;     // a light that lacks what somebody could use stays as it is

@@ -33,6 +33,7 @@ void gn_room_get_figures(struct gn_room *room, struct gn_room_figures *out_figur
     out_figures->n_viewers = room->n_viewers;
     out_figures->n_probes = room->n_probes;
     out_figures->n_screens = room->n_screens;
+    out_figures->n_trackers = room->n_trackers;
     out_figures->has_capture = room->n_reached > 0;
     out_figures->has_environment_waiting = gn_probes_has_frame(&room->probes);
     struct gn_time_window vga = room->vga_ms;
@@ -56,7 +57,7 @@ void gn_room_get_statistics(struct gn_room *room, struct gn_msg_statistics *out_
     int64_t now_ns = gn_clock_get_monotonic_ns();
     memset(out_statistics, 0, sizeof(*out_statistics));
     gn_wire_set_string(out_statistics->room, sizeof(out_statistics->room), room->name);
-    out_statistics->sessions = (uint32_t)(f.n_viewers + f.n_probes + f.n_screens);
+    out_statistics->sessions = (uint32_t)(f.n_viewers + f.n_probes + f.n_screens + f.n_trackers);
     out_statistics->frames_in = f.frames_in;
     out_statistics->frames_out = f.frames_out;
     out_statistics->frames_dropped = f.frames_dropped;

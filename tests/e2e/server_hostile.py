@@ -57,7 +57,6 @@ def test_hellos():
     cases = [
         (hello(version_min=2, version_max=3), pb.ERROR_CODE_VERSION, ('2', '3', '1')),
         (hello(room='cellar'), pb.ERROR_CODE_NO_SUCH_ROOM, ('demo',)),
-        (hello(role=pb.ROLE_TRACKER), pb.ERROR_CODE_UNSUPPORTED, ('not built',)),
         (hello(role=pb.ROLE_UNSPECIFIED), pb.ERROR_CODE_BAD_VALUE, ()),
         (hello(resume_token=b'x'), pb.ERROR_CODE_UNSUPPORTED, ('resume_token',)),
         (hello(ticket=b'x'), pb.ERROR_CODE_UNSUPPORTED, ('ticket',)),
