@@ -7,22 +7,11 @@
 #include <string.h>
 
 #include "common/log.h"
-#include "server/light/blend.h"
-#include "server/room/convert.h"
 #include "server/room/environment.h"
-#include "server/room/lighting_message.h"
-#include "server/room/room_internal.h"
+#include "server/room/light_thread.h"
 #include "server/room/same_frame.h"
 
 GN_LOG_TOPIC("room");
-
-/** Sessions that a lighting state goes to, and whether any wants its map. */
-struct subscribers {
-    uint64_t ids[GN_ROOM_MAX_SUBSCRIBERS];
-    bool want_map[GN_ROOM_MAX_SUBSCRIBERS];
-    int n;
-    bool any_map, any_plain;
-};
 
 /** What of a lighting state somebody in the room can use now. */
 struct wants {
@@ -37,9 +26,9 @@ struct work {
     struct gn_probe_work probe; // where has_job
     bool is_stale;              // the probes' lights are to be joined anew
     bool has_picture;
-    struct gn_emitter_job picture; // where has_picture
-    struct subscribers newcomers;  // who has not been sent the states that are there
-    int n_lights;                  // > 0 where newcomers.n > 0
+    struct gn_emitter_job picture;   // where has_picture
+    struct gn_subscribers newcomers; // who has not been sent the states that are there
+    int n_lights;                    // > 0 where newcomers.n > 0
     struct gn_lighting_state *lights[GN_PROBES_MAX]; // references: each probe's
 };
 
@@ -53,23 +42,6 @@ static bool is_light_wanted_locked(struct gn_room *room) GN_REQUIRES(room->mu)
         return true;
     return room->light_asked_ns > 0 &&
            gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
-}
-
-/** Lists the subscribers that know the states there are, or those that are to be told of them all,
- * who then count as told. */
-static void take_subscribers_locked(struct gn_room *room, bool newcomers, struct subscribers *out)
-    GN_REQUIRES(room->mu)
-{
-    memset(out, 0, sizeof(*out));
-    for (struct gn_room_session *s = room->sessions; s; s = s->next) {
-        if (!s->want_lighting_states || newcomers == s->was_told)
-            continue;
-        s->was_told = true;
-        out->ids[out->n] = s->id;
-        out->want_map[out->n++] = s->want_lighting_maps;
-        out->any_map = out->any_map || s->want_lighting_maps;
-        out->any_plain = out->any_plain || !s->want_lighting_maps;
-    }
 }
 
 static struct wants get_wants_locked(const struct gn_room *room) GN_REQUIRES(room->mu)
@@ -108,7 +80,7 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
         out->is_short = is_light_short_locked(room, out->wants);
         if (out->is_short)
             break; // before anybody is told of it
-        take_subscribers_locked(room, true, &out->newcomers);
+        gn_subscribers_take_locked(room, true, &out->newcomers);
         int newest;
         if (out->newcomers.n > 0)
             out->n_lights = gn_probes_get_lights(&room->probes, out->lights, &newest);
@@ -122,238 +94,6 @@ static bool wait_for_work(struct gn_room *room, struct work *out)
     }
     gn_mutex_unlock(&room->mu);
     return out->has_job || out->has_picture || out->n_lights > 0 || out->is_stale || out->is_short;
-}
-
-/** Tells the sender what is wrong with its ENVIRONMENT_FRAME or EMITTER_FRAME. */
-static void refuse(struct gn_room *room, uint64_t session_id, enum gn_wire_type type,
-                   uint64_t sequence, int code, const char *sentence)
-{
-    bool is_emitter = type == GN_WIRE_EMITTER_FRAME;
-    gn_mutex_lock(&room->mu);
-    room->figures.environment_refused += !is_emitter;
-    room->figures.emitter_refused += is_emitter;
-    gn_mutex_unlock(&room->mu);
-    static struct gn_log_limiter limiter = {.burst = 50, .interval_ns = GN_NS_PER_S};
-    gn_log_limited(&limiter, GN_LOG_DEBUG, "room %s: session %llu: %s %llu refused: %s", room->name,
-                   (unsigned long long)session_id, gn_wire_get_info(type)->name,
-                   (unsigned long long)sequence, sentence);
-    struct gn_note *note;
-    if (gn_mailbox_get_blank(room->options.mailbox, &note) < 0)
-        return;
-    note->session_id = session_id;
-    gn_note_set_error(note,
-                      code == -ENOMEM ? GN_MSG_ERROR_CODE_INTERNAL : GN_MSG_ERROR_CODE_BAD_VALUE,
-                      type, sequence, sentence);
-    gn_mailbox_post(room->options.mailbox, note);
-}
-
-/** Posts a LIGHTING_STATE of this room to one session. Returns 0 or -ENOMEM. */
-static int post_state(struct gn_room *room, uint64_t session_id,
-                      const struct gn_msg_lighting_state *body, struct gn_buf *payload)
-{
-    struct gn_note *note;
-    int rc = gn_mailbox_get_blank(room->options.mailbox, &note);
-    if (rc < 0)
-        return rc;
-    struct gn_msg_lighting_state *m = &note->body.lighting_state;
-    note->session_id = session_id;
-    note->type = GN_WIRE_LIGHTING_STATE;
-    *m = *body;
-    gn_wire_set_string(m->room, sizeof(m->room), room->name);
-    gn_wire_set_string(m->node, sizeof(m->node), room->node);
-    note->payload = payload ? gn_buf_ref(payload) : NULL;
-    gn_mailbox_post(room->options.mailbox, note);
-    return 0;
-}
-
-static void warn_not_sent(const struct gn_room *room, uint64_t sequence, int code)
-{
-    gn_log(GN_LOG_WARN, "room %s: lighting state %llu not sent: %s", room->name,
-           (unsigned long long)sequence, strerror(-code));
-}
-
-static void tell_subscribers(struct gn_room *room, const struct gn_lighting_state *state,
-                             const struct subscribers *subscribers)
-{
-    struct gn_msg_lighting_state bodies[2] = {0}; // without and with the map
-    struct gn_buf *payloads[2] = {0};
-    int rc = 0;
-    if (subscribers->any_plain)
-        rc = gn_lighting_message_make(state, false, room->options.pool, &bodies[0], &payloads[0]);
-    if (rc == 0 && subscribers->any_map)
-        rc = gn_lighting_message_make(state, true, room->options.pool, &bodies[1], &payloads[1]);
-    for (int i = 0; rc == 0 && i < subscribers->n; i++) {
-        int which = subscribers->want_map[i];
-        rc = post_state(room, subscribers->ids[i], &bodies[which], payloads[which]);
-    }
-    if (rc < 0)
-        warn_not_sent(room, state->sequence, rc);
-    gn_buf_unref(&payloads[0]);
-    gn_buf_unref(&payloads[1]);
-}
-
-/** Tells those who know the probe's states that its light has gone. */
-static void tell_gone(struct gn_room *room, const struct gn_reached *probe)
-{
-    struct subscribers subscribers;
-    const struct gn_msg_lighting_state body = {
-        .sequence = probe->sequence, .probe = probe->stream, .gone = true};
-    gn_mutex_lock(&room->mu);
-    take_subscribers_locked(room, false, &subscribers);
-    gn_mutex_unlock(&room->mu);
-    int rc = 0;
-    for (int i = 0; rc == 0 && i < subscribers.n; i++)
-        rc = post_state(room, subscribers.ids[i], &body, NULL);
-    if (rc < 0)
-        warn_not_sent(room, probe->sequence, rc);
-}
-
-static void unref_all(struct gn_lighting_state **lights, int n)
-{
-    for (int i = 0; i < n; i++)
-        gn_lighting_state_unref(&lights[i]);
-}
-
-/** Makes the state the room's light; takes the reference. n_lights: distant ones, < 0: as before.
- */
-static void show(struct gn_room *room, struct gn_lighting_state *state, int n_lights)
-{
-    gn_mutex_lock(&room->mu);
-    struct gn_lighting_state *old = room->light;
-    room->light = state;
-    room->figures.has_light = true;
-    room->figures.light_sequence = state->sequence;
-    room->figures.light_capture_ns = state->capture_time_ns;
-    room->figures.n_near = state->n_near;
-    if (n_lights >= 0)
-        room->figures.n_lights = n_lights;
-    gn_cond_signal(&room->render_wake);
-    gn_mutex_unlock(&room->mu);
-    gn_lighting_state_unref(&old);
-}
-
-static bool gives_light(const struct gn_emission *emission)
-{
-    for (int i = 0; emission && i < emission->n_lights; i++)
-        for (int c = 0; c < 3; c++)
-            if (emission->lights[i].intensity[c] > 0)
-                return true;
-    return false;
-}
-
-/** Shows what the emitters send now, in the light that is there or, where they give some, in the
- * dark. 0 or a negative errno. */
-static int show_emission(struct gn_room *room)
-{
-    struct gn_emission *emission = gn_emitters_get_emission(room->emitters);
-    struct gn_lighting_state *state = NULL;
-    struct gn_error error;
-    gn_mutex_lock(&room->mu);
-    struct gn_lighting_state *light = room->light ? gn_lighting_state_ref(room->light) : NULL;
-    gn_mutex_unlock(&room->mu);
-    int rc = 0;
-    if (light)
-        rc = gn_lighting_state_replace_emission(light, emission, &state);
-    else if (gives_light(emission))
-        rc = gn_lighting_state_create_dark(emission, &room->options.light,
-                                           gn_clock_get_monotonic_ns(), &state, &error);
-    if (rc == 0 && state)
-        show(room, state, light ? -1 : 0);
-    gn_lighting_state_unref(&light);
-    gn_emission_unref(&emission);
-    return rc;
-}
-
-/** From one picture to the near light of its stream's emitters: the map stays. */
-static void show_picture(struct gn_room *room, struct gn_screen_decoder *decoder,
-                         struct gn_emitter_job *job)
-{
-    struct gn_error error = {0};
-    int rc = gn_screen_decode(decoder, &job->frame, job->payload, &error);
-    if (rc == 0)
-        rc = gn_emitters_set_picture(room->emitters, job->stream, &decoder->linear, &error);
-    if (rc == 0 && (rc = show_emission(room)) < 0)
-        gn_error_set(&error, rc, "out of memory");
-    if (rc < 0) {
-        refuse(room, job->session_id, GN_WIRE_EMITTER_FRAME, job->frame.sequence, rc, error.text);
-    } else {
-        gn_mutex_lock(&room->mu);
-        room->figures.emitter_shown++;
-        gn_mutex_unlock(&room->mu);
-    }
-    gn_buf_unref(&job->payload);
-}
-
-static bool has_stream(struct gn_lighting_state *const *lights, int n, uint64_t stream)
-{
-    for (int i = 0; i < n; i++)
-        if (lights[i]->stream == stream)
-            return true;
-    return false;
-}
-
-/** How far each probe's light has come that is the room's now: frames may wait for it, and
- * subscribers forget the others. */
-static void set_reached(struct gn_room *room, struct gn_lighting_state *const *lights, int n)
-{
-    struct gn_reached gone[GN_PROBES_MAX];
-    int n_gone = 0;
-    gn_mutex_lock(&room->mu);
-    for (int i = 0; i < room->n_reached; i++)
-        if (!has_stream(lights, n, room->reached[i].stream))
-            gone[n_gone++] = room->reached[i];
-    room->n_reached = n;
-    for (int i = 0; i < n; i++) {
-        room->reached[i].stream = lights[i]->stream;
-        room->reached[i].sequence = lights[i]->sequence;
-    }
-    gn_cond_signal(&room->render_wake);
-    gn_mutex_unlock(&room->mu);
-    for (int i = 0; i < n_gone; i++)
-        tell_gone(room, &gone[i]);
-}
-
-static bool is_reached_locked(const struct gn_room *room, uint64_t stream) GN_REQUIRES(room->mu)
-{
-    for (int i = 0; i < room->n_reached; i++)
-        if (room->reached[i].stream == stream)
-            return true;
-    return false;
-}
-
-/** Makes the light of all probes the room's, and the scene's own with it. */
-static void join_lights(struct gn_room *room)
-{
-    struct gn_lighting_state *lights[GN_PROBES_MAX], *joined;
-    int newest, n_lights = 0;
-    gn_mutex_lock(&room->mu);
-    int n = gn_probes_get_lights(&room->probes, lights, &newest);
-    room->is_light_stale = false; // a probe that leaves from here on makes it so again
-    gn_mutex_unlock(&room->mu);
-    if (n == 0) {
-        if (show_emission(room) < 0)
-            gn_log(GN_LOG_WARN, "room %s: the scene's own light not shown: out of memory",
-                   room->name);
-        return;
-    }
-    for (int i = 0; i < n; i++)
-        n_lights += lights[i]->n_lights;
-    struct gn_emission *emission = gn_emitters_get_emission(room->emitters);
-    int rc = gn_lighting_state_join(lights, n, newest, &joined);
-    if (rc == 0 && emission) {
-        struct gn_lighting_state *dark = joined;
-        rc = gn_lighting_state_replace_emission(dark, emission, &joined);
-        gn_lighting_state_unref(&dark);
-    }
-    gn_emission_unref(&emission);
-    if (rc == 0) {
-        show(room, joined, n_lights);
-        set_reached(room, lights, n);
-    } else {
-        gn_log(GN_LOG_WARN, "room %s: the lights of %d probes not joined: %s", room->name, n,
-               strerror(-rc));
-    }
-    unref_all(lights, n);
 }
 
 /** What is told of a state's making. */
@@ -407,7 +147,7 @@ static void warn_of_clipping(struct gn_room *room, uint64_t probe_id,
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
                     struct gn_worked_frame *worked, double ms_decode, bool is_same)
 {
-    struct subscribers subscribers;
+    struct gn_subscribers subscribers;
     struct gn_lighting_state *mine = gn_lighting_state_ref(state);
     struct gn_probe old[GN_PROBES_MAX];
     int n_old;
@@ -424,15 +164,15 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
         gn_probe_finish(&old[i]);
     if (is_there) {
         warn_of_clipping(room, probe_id, mine);
-        join_lights(room);
+        gn_light_join(room);
         gn_mutex_lock(&room->mu);
-        is_there = is_reached_locked(room, mine->stream); // its probe may have left
+        is_there = gn_light_is_reached_locked(room, mine->stream); // its probe may have left
         gn_probes_settle(&room->probes, probe_id);
         gn_cond_signal(&room->render_wake);
-        take_subscribers_locked(room, false, &subscribers);
+        gn_subscribers_take_locked(room, false, &subscribers);
         gn_mutex_unlock(&room->mu);
         if (is_there && subscribers.n > 0)
-            tell_subscribers(room, mine, &subscribers);
+            gn_subscribers_tell(room, mine, &subscribers);
     }
     gn_lighting_state_unref(&mine);
 }
@@ -447,7 +187,8 @@ static void refuse_environment(struct gn_room *room, const struct gn_environment
     gn_cond_signal(&room->render_wake); // nobody waits for its light any more
     gn_mutex_unlock(&room->mu);
     gn_probe_finish(&old);
-    refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, code, sentence);
+    gn_light_refuse(room, job->session_id, GN_WIRE_ENVIRONMENT_FRAME, job->frame.sequence, code,
+                    sentence);
 }
 
 static struct gn_light_options get_light_options(const struct gn_room *room, struct wants wants)
@@ -484,8 +225,8 @@ static void complete_lights(struct gn_room *room, struct wants wants)
         gn_mutex_unlock(&room->mu);
         gn_lighting_state_unref(&old);
     }
-    unref_all(lights, n);
-    join_lights(room);
+    gn_light_unref_all(lights, n);
+    gn_light_join(room);
 }
 
 /** The frame is what its probe's next ones are compared with; where there is no memory they are all
@@ -560,12 +301,12 @@ void gn_room_run_light(void *context)
         if (work.is_short)
             complete_lights(room, work.wants);
         if (work.is_stale)
-            join_lights(room);
+            gn_light_join(room);
         for (int i = 0; i < work.n_lights; i++)
-            tell_subscribers(room, work.lights[i], &work.newcomers);
-        unref_all(work.lights, work.n_lights);
+            gn_subscribers_tell(room, work.lights[i], &work.newcomers);
+        gn_light_unref_all(work.lights, work.n_lights);
         if (work.has_picture)
-            show_picture(room, &screen_decoder, &work.picture);
+            gn_light_show_picture(room, &screen_decoder, &work.picture);
         if (work.has_job)
             make_light(room, decoder, &work.probe, work.wants);
     }
