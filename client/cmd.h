@@ -17,6 +17,7 @@
 /** argv[0] is the command's name. Each returns the process's exit status. */
 int gn_cmd_probe(int argc, char *const argv[]);
 int gn_cmd_screen(int argc, char *const argv[]);
+int gn_cmd_track(int argc, char *const argv[]);
 int gn_cmd_view(int argc, char *const argv[]);
 int gn_cmd_doctor(int argc, char *const argv[]);
 

@@ -17,6 +17,7 @@ static const struct {
 } commands[] = {
     {"probe", gn_cmd_probe, "stream environment frames: the light of the room"},
     {"screen", gn_cmd_screen, "stream pictures onto a screen of the scene: near light"},
+    {"track", gn_cmd_track, "stream poses of an object of the scene: it moves"},
     {"view", gn_cmd_view, "stream camera frames and poses, write the composited frames"},
     {"doctor", gn_cmd_doctor, "say what on this machine works"},
 };

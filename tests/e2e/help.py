@@ -14,6 +14,7 @@ REPLAY = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
     ([GNOMON, 'probe'], CONNECT | REPLAY | {'setup', 'projection', 'first-sequence'}),
+    ([GNOMON, 'track'], CONNECT | {'object', 'poses', 'orbit', 'rate', 'count'}),
     ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
     ([GNOMON, 'view'], CONNECT | REPLAY | {'camera', 'out', 'result', 'jpeg-quality', 'quality',
                                            'outstanding', 'match', 'sync-light'}),
@@ -64,7 +65,7 @@ def check_program():
     """gnomon itself: each command once, with a summary."""
     text = ask(GNOMON, '--help')
     check_shape(text)
-    for command in ('probe', 'screen', 'view', 'doctor'):
+    for command in ('probe', 'screen', 'track', 'view', 'doctor'):
         assert len(re.findall(r'^  %s +\S' % command, text, re.M)) == 1, text
     assert ask(GNOMON, 'help') == ask(GNOMON, '-h') == text
     assert re.fullmatch(r'gnomon \d+\.\d+\.\d+\n', ask(GNOMON, '--version'))

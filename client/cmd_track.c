@@ -1,0 +1,238 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * gnomon track: streams the poses of a movable object, from a file or along a circle.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/cmd.h"
+#include "common/clock.h"
+#include "common/file.h"
+#include "proto/attr.h"
+
+/** Most bytes of a file of poses, and how long the server's last words are waited for. */
+#define MAX_FILE_BYTES ((size_t)256 << 20)
+#define LAST_WORDS_MS 200
+#define ORBIT_PERIOD_S 4.0
+
+static const struct gn_option option_table[] = {
+    GN_CMD_CONNECT_OPTIONS,
+    {.key = "object",
+     .flag = "object",
+     .type = GN_OPTION_STRING,
+     .value_name = "NAME",
+     .is_required = true,
+     .help = "Which object: the name of one with \"movable\": true in the room's scene.json."},
+    {.key = "poses",
+     .flag = "poses",
+     .type = GN_OPTION_STRING,
+     .value_name = "FILE",
+     .help = "Where it is when: a line of JSON for each pose, {\"time_s\": 0.02, "
+             "\"world_from_object\": [16 numbers, row-major]}, times rising. Nearly rigid matrices "
+             "are mended; mirrored, singular and stretched ones refused."},
+    {.key = "orbit",
+     .flag = "orbit",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0,
+     .max = 1e5,
+     .value_name = "RADIUS",
+     .help =
+         "Instead, to try things out: once in 4 s around the world's z axis at this distance in "
+         "metres, until Ctrl-C or --count."},
+    {.key = "rate",
+     .flag = "rate",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0.001,
+     .max = 1000,
+     .value_name = "HZ",
+     .help = "Poses per second. Without it a file keeps its own times; an orbit goes at 60."},
+    {.key = "count",
+     .flag = "count",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 1e9,
+     .value_name = "N",
+     .help = "Stop after so many poses."},
+};
+
+static const struct gn_program program = {
+    .name = "gnomon track",
+    .usage = "--object NAME --poses FILE|--orbit RADIUS [OPTION]...",
+    .summary = "Moves an object of the room's scene. It stays at its last pose when this ends.",
+    .notes = "Examples:\n"
+             "  gnomon track --object teapot --orbit 0.2\n"
+             "  gnomon track --object teapot --poses path.jsonl --rate 60\n",
+    .options = option_table,
+    .n_options = GN_ARRAY_LEN(option_table),
+};
+
+struct timed_pose {
+    double time_s;
+    struct gn_pose pose;
+};
+
+/** One run of the command. */
+struct track {
+    struct gn_client *client;
+    struct gn_msg_pose message;
+    struct timed_pose *poses; // [n], owned; NULL: an orbit
+    long n;
+    double orbit_m, rate_hz; // rate 0: the file's times
+    long n_wanted, n_sent;   // wanted 0: all
+};
+
+static int read_line(struct track *t, const char *line, size_t size, const char *name,
+                     struct gn_error *out_error)
+{
+    static const char *const keys[] = {"time_s", "world_from_object"};
+    struct gn_json root = {0};
+    struct timed_pose *pose = &t->poses[t->n];
+    int err = gn_json_load_text(line, size, name, &root, out_error);
+    if (!err)
+        err = gn_json_check_keys(&root, keys, GN_ARRAY_LEN(keys), out_error);
+    if (!err)
+        err = gn_json_get_double(&root, "time_s", -1e9, 1e9, &pose->time_s, out_error);
+    if (!err && t->n > 0 && pose->time_s <= t->poses[t->n - 1].time_s)
+        err = gn_json_refuse(&root, "time_s", out_error, "%g s does not come after %g s",
+                             pose->time_s, t->poses[t->n - 1].time_s);
+    if (!err)
+        err = gn_pose_read_json(&root, "world_from_object", &pose->pose, out_error);
+    gn_json_finish(&root);
+    t->n += err == 0;
+    return err;
+}
+
+static int read_poses(struct track *t, const char *path, struct gn_error *out_error)
+{
+    char *text = NULL;
+    size_t size = 0;
+    int err = gn_file_read_text(path, MAX_FILE_BYTES, &text, &size, out_error);
+    if (err)
+        return err;
+    size_t n_lines = 1;
+    for (const char *c = text; *c; c++)
+        n_lines += *c == '\n';
+    t->poses = calloc(n_lines, sizeof(*t->poses));
+    if (!t->poses)
+        err = gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
+    long number = 1;
+    for (const char *line = text; !err && *line; number++) {
+        size = strcspn(line, "\n");
+        char name[512];
+        snprintf(name, sizeof(name), "%s, line %ld", path, number);
+        if (strspn(line, " \t\r") < size)
+            err = read_line(t, line, size, name, out_error);
+        line += size + (line[size] == '\n');
+    }
+    free(text);
+    if (!err && t->n == 0)
+        err = gn_error_set(out_error, -EINVAL, "%s: no pose in it", path);
+    return err;
+}
+
+/** The i-th pose and its time after the first. */
+static struct timed_pose get_pose(const struct track *t, long i)
+{
+    if (t->poses) {
+        struct timed_pose pose = t->poses[i];
+        pose.time_s = t->rate_hz > 0 ? (double)i / t->rate_hz : pose.time_s - t->poses[0].time_s;
+        return pose;
+    }
+    double time_s = (double)i / t->rate_hz;
+    double angle = 2 * 3.14159265358979323846 * time_s / ORBIT_PERIOD_S;
+    return (struct timed_pose){time_s,
+                               {{cos(angle / 2), 0, 0, sin(angle / 2)},
+                                {t->orbit_m * cos(angle), t->orbit_m * sin(angle), 0}}};
+}
+
+/** Listens to the server until then. Returns 0, or a negative errno and a sentence. */
+static int wait_until(const struct track *t, int64_t until_ns, struct gn_error *out_error)
+{
+    for (;;) {
+        int64_t left_ns = until_ns - gn_client_now_ns();
+        struct gn_client_event event;
+        if (gn_cmd_is_interrupted())
+            return gn_error_set(out_error, -EINTR, "interrupted");
+        int left_ms = left_ns > 0 ? (int)(left_ns / GN_NS_PER_MS) + 1 : 0;
+        int rc = gn_client_poll(t->client, left_ms > 100 ? 100 : left_ms, &event);
+        if (rc < 0)
+            return gn_cmd_set_fault(t->client, rc, out_error);
+        if (rc > 0 && (rc = gn_cmd_take_event(&event, out_error)) < 0)
+            return rc;
+        if (rc == 0 && left_ns <= 0)
+            return 0;
+    }
+}
+
+static int send_all(struct track *t, struct gn_error *out_error)
+{
+    int64_t start_ns = gn_client_now_ns();
+    int err = 0;
+    while (!err && !(t->poses && t->n_sent == t->n) &&
+           !(t->n_wanted > 0 && t->n_sent == t->n_wanted)) {
+        struct timed_pose pose = get_pose(t, t->n_sent);
+        int64_t due_ns = start_ns + (int64_t)(pose.time_s * 1e9);
+        err = wait_until(t, due_ns, out_error);
+        if (err)
+            break;
+        gn_cmd_make_transform(&pose.pose, &t->message.world_from_object);
+        t->message.has_world_from_object = true;
+        t->message.time_ns = gn_client_to_server_ns(t->client, gn_client_now_ns());
+        err = gn_client_send_pose(t->client, &t->message);
+        if (err)
+            return gn_cmd_set_fault(t->client, err, out_error);
+        t->n_sent++;
+    }
+    // What is wrong with the last ones is said only now.
+    return err ? err : wait_until(t, gn_client_now_ns() + LAST_WORDS_MS * GN_NS_PER_MS, out_error);
+}
+
+static int prepare(struct track *t, const struct gn_options *options, struct gn_error *out_error)
+{
+    const char *name = gn_options_get_string(options, NULL, NULL, "object");
+    const char *path = gn_options_get_string(options, NULL, NULL, "poses");
+    bool has_orbit = gn_options_is_set(options, NULL, NULL, "orbit");
+    if (!name[0] || strlen(name) >= sizeof(t->message.object))
+        return gn_error_set(out_error, -EINVAL, "--object: names have 1 to 63 bytes");
+    if ((path != NULL) == has_orbit)
+        return gn_error_set(out_error, -EINVAL, "give one of --poses and --orbit");
+    gn_wire_set_string(t->message.object, sizeof(t->message.object), name);
+    if (gn_options_is_set(options, NULL, NULL, "rate"))
+        t->rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
+    if (gn_options_is_set(options, NULL, NULL, "count"))
+        t->n_wanted = (long)gn_options_get_int(options, NULL, NULL, "count");
+    if (path)
+        return read_poses(t, path, out_error);
+    t->orbit_m = gn_options_get_double(options, NULL, NULL, "orbit");
+    t->rate_hz = t->rate_hz > 0 ? t->rate_hz : 60;
+    return 0;
+}
+
+int gn_cmd_track(int argc, char *const argv[])
+{
+    struct gn_options *options = NULL;
+    struct track t = {0};
+    struct gn_error error = {0};
+    int rc = gn_cmd_load(&program, argc, argv, &options);
+    if (rc <= 0)
+        return rc < 0 ? 2 : 0;
+    gn_cmd_catch_signals();
+    rc = prepare(&t, options, &error);
+    if (rc == 0)
+        rc = gn_cmd_connect(&program, options, GN_MSG_ROLE_TRACKER, &t.client, &error);
+    if (rc == 0)
+        rc = send_all(&t, &error);
+    bool is_done = rc == 0 || (rc == -EINTR && !t.poses && t.n_wanted == 0); // an orbit's end
+    if (!is_done)
+        gn_cmd_fail(&program, error.text);
+    if (t.client && (is_done || rc == -EINTR))
+        printf("%ld poses sent\n", t.n_sent);
+    gn_cmd_disconnect(&t.client);
+    gn_options_destroy(&options);
+    free(t.poses);
+    return is_done ? 0 : 1;
+}
