@@ -84,30 +84,63 @@ void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
     sample->dir_z = dir_camera[2];
 }
 
+/** What the sample sees, by its ray's hit. */
+static void take_hit(const struct frame *frame, struct sample *s, const struct gn_rt_hit *hit,
+                     struct tile_figures *figures)
+{
+    const struct gn_surface *surface = &s->surface;
+    gn_scene_get_surface(frame->scene, s->dir, hit, &s->surface);
+    s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
+    s->object = hit->object;
+    s->depth = hit->distance * s->dir_z;
+    gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
+                        surface->normal_geometric, s->org);
+    // A shadow is less light on a diffuse surface; a real mirror shows other things.
+    s->is_receiver = s->kind == SAMPLE_REAL && surface->material == GN_MATERIAL_DIFFUSE;
+    figures->n_receivers += s->is_receiver;
+}
+
+/** Up to 16 samples, neighbours, at once. */
+static void trace_packet(const struct frame *frame, struct sample *samples, int n,
+                         struct tile_figures *figures)
+{
+    struct gn_rt_packet packet;
+    struct gn_rt_hit hits[GN_RT_PACKET];
+    int n_rays = 0;
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        struct sample *s = &samples[i < n ? i : 0];
+        bool has_ray = i < n && s->dir_z > 0;
+        packet.org_x[i] = frame->origin[0];
+        packet.org_y[i] = frame->origin[1];
+        packet.org_z[i] = frame->origin[2];
+        packet.dir_x[i] = s->dir[0];
+        packet.dir_y[i] = s->dir[1];
+        packet.dir_z[i] = s->dir[2];
+        packet.t_near[i] = 0;
+        packet.t_far[i] = INFINITY;
+        packet.valid[i] = has_ray ? -1 : 0;
+        n_rays += has_ray;
+    }
+    if (n_rays == 0)
+        return;
+    figures->rays_primary += (uint64_t)n_rays;
+    // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
+    uint32_t met = gn_rt_intersect16(frame->rt, GN_RT_ALL, &packet, hits);
+    for (; met != 0; met &= met - 1) {
+        int i = __builtin_ctz(met);
+        take_hit(frame, &samples[i], &hits[i], figures);
+    }
+}
+
 void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
                       struct tile_figures *figures)
 {
     for (int i = 0; i < n; i++) {
         struct sample *s = &samples[i];
-        struct gn_rt_hit hit;
         s->kind = SAMPLE_NOTHING;
         s->depth = INFINITY;
         s->is_receiver = s->is_cut = s->is_lit = false;
-        if (!(s->dir_z > 0))
-            continue;
-        figures->rays_primary++;
-        // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
-        if (!gn_rt_intersect(frame->rt, GN_RT_ALL, frame->origin, s->dir, 0, INFINITY, &hit))
-            continue;
-        gn_scene_get_surface(frame->scene, s->dir, &hit, &s->surface);
-        const struct gn_surface *surface = &s->surface;
-        s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
-        s->object = hit.object;
-        s->depth = hit.distance * s->dir_z;
-        gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
-                            surface->normal_geometric, s->org);
-        // A shadow is less light on a diffuse surface; a real mirror shows other things.
-        s->is_receiver = s->kind == SAMPLE_REAL && surface->material == GN_MATERIAL_DIFFUSE;
-        figures->n_receivers += s->is_receiver;
     }
+    for (int i = 0; i < n; i += GN_RT_PACKET)
+        trace_packet(frame, samples + i, n - i < GN_RT_PACKET ? n - i : GN_RT_PACKET, figures);
 }

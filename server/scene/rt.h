@@ -116,6 +116,13 @@ bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org
                      const float dir[static 3], float t_near, float t_far,
                      struct gn_rt_hit *out_hit);
 
+/** The nearest hits of up to 16 rays at once; bit i of the result: lane i is valid and has met
+ * something; the others of out_hits[16] are untouched. A hit's last bits may differ from those that
+ * gn_rt_intersect finds. */
+uint32_t gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
+                           const struct gn_rt_packet *packet,
+                           struct gn_rt_hit out_hits[static GN_RT_PACKET]);
+
 /** True where anything lies in (t_near, t_far). dir unit. */
 bool gn_rt_is_occluded(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
                        const float dir[static 3], float t_near, float t_far);

@@ -25,6 +25,16 @@ static void trace_occluded16(const int *valid, RTCScene scene, bool has_instance
     (void)has_instances;
     rtcOccluded16(valid, scene, ray, NULL);
 }
+
+static void trace_intersect16(const int *valid, RTCScene scene, bool has_instances,
+                              struct RTCRayHit16 *rayhit)
+{
+    struct RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    if (!has_instances)
+        arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, rayhit, &arguments);
+}
 #else
 static void trace_intersect1(RTCScene scene, struct RTCRayHit *rayhit)
 {
@@ -50,6 +60,16 @@ static void trace_occluded16(const int *valid, RTCScene scene, bool has_instance
     if (!has_instances)
         context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcOccluded16(valid, scene, &context, ray);
+}
+
+static void trace_intersect16(const int *valid, RTCScene scene, bool has_instances,
+                              struct RTCRayHit16 *rayhit)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    if (!has_instances)
+        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, &context, rayhit);
 }
 #endif
 
@@ -114,6 +134,17 @@ static void fill_hit(const struct rt_mesh *mesh, const struct rt_stand *stand,
         hit->normal[k] = (float)(n[k] * scale);
 }
 
+/** The hit of a triangle of a mesh or, where mover is not RTC_INVALID_GEOMETRY_ID, of a mover. */
+static void make_hit(const struct gn_rt *rt, unsigned mover, unsigned geometry, unsigned triangle,
+                     float distance, float u, float v, struct gn_rt_hit *out_hit)
+{
+    bool moves = mover != RTC_INVALID_GEOMETRY_ID;
+    const struct rt_mesh *mesh = moves ? &rt->movers[mover].mesh : &rt->meshes[geometry];
+    *out_hit = (struct gn_rt_hit){
+        .distance = distance, .u = u, .v = v, .object = mesh->object, .triangle = triangle};
+    fill_hit(mesh, moves ? &rt->stands[mover] : NULL, out_hit);
+}
+
 bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
                      const float dir[static 3], float t_near, float t_far,
                      struct gn_rt_hit *out_hit)
@@ -129,18 +160,52 @@ bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org
         trace_intersect1(rt->moving[set - 1], &rayhit);
     if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return false;
-    unsigned mover = rayhit.hit.instID[0];
-    bool moves = mover != RTC_INVALID_GEOMETRY_ID;
-    const struct rt_mesh *mesh = moves ? &rt->movers[mover].mesh : &rt->meshes[rayhit.hit.geomID];
-    *out_hit = (struct gn_rt_hit){
-        .distance = rayhit.ray.tfar,
-        .u = rayhit.hit.u,
-        .v = rayhit.hit.v,
-        .object = mesh->object,
-        .triangle = rayhit.hit.primID,
-    };
-    fill_hit(mesh, moves ? &rt->stands[mover] : NULL, out_hit);
+    make_hit(rt, rayhit.hit.instID[0], rayhit.hit.geomID, rayhit.hit.primID, rayhit.ray.tfar,
+             rayhit.hit.u, rayhit.hit.v, out_hit);
     return true;
+}
+
+/** The packet as Embree has it. */
+static void fill_rays(const struct gn_rt_packet *packet, struct RTCRay16 *ray)
+{
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        ray->org_x[i] = packet->org_x[i];
+        ray->org_y[i] = packet->org_y[i];
+        ray->org_z[i] = packet->org_z[i];
+        ray->tnear[i] = packet->t_near[i];
+        ray->dir_x[i] = packet->dir_x[i];
+        ray->dir_y[i] = packet->dir_y[i];
+        ray->dir_z[i] = packet->dir_z[i];
+        ray->time[i] = 0.0f;
+        ray->tfar[i] = packet->t_far[i];
+        ray->mask[i] = 0xffffffffu;
+        ray->id[i] = 0;
+        ray->flags[i] = 0;
+    }
+}
+
+uint32_t gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
+                           const struct gn_rt_packet *packet,
+                           struct gn_rt_hit out_hits[static GN_RT_PACKET])
+{
+    assert(rt->is_committed);
+    struct RTCRayHit16 rayhit;
+    uint32_t met = 0;
+    fill_rays(packet, &rayhit.ray);
+    for (int i = 0; i < GN_RT_PACKET; i++)
+        rayhit.hit.geomID[i] = rayhit.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    if (rt->scenes[set - 1])
+        trace_intersect16(packet->valid, rt->scenes[set - 1], false, &rayhit);
+    if (rt->moving[set - 1])
+        trace_intersect16(packet->valid, rt->moving[set - 1], true, &rayhit);
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        if (packet->valid[i] == 0 || rayhit.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID)
+            continue;
+        make_hit(rt, rayhit.hit.instID[0][i], rayhit.hit.geomID[i], rayhit.hit.primID[i],
+                 rayhit.ray.tfar[i], rayhit.hit.u[i], rayhit.hit.v[i], &out_hits[i]);
+        met |= 1u << i;
+    }
+    return met;
 }
 
 bool gn_rt_is_occluded(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
@@ -169,20 +234,7 @@ uint32_t gn_rt_get_occluded16(const struct gn_rt *rt, enum gn_rt_set set,
 {
     assert(rt->is_committed);
     struct RTCRay16 ray;
-    for (int i = 0; i < GN_RT_PACKET; i++) {
-        ray.org_x[i] = packet->org_x[i];
-        ray.org_y[i] = packet->org_y[i];
-        ray.org_z[i] = packet->org_z[i];
-        ray.tnear[i] = packet->t_near[i];
-        ray.dir_x[i] = packet->dir_x[i];
-        ray.dir_y[i] = packet->dir_y[i];
-        ray.dir_z[i] = packet->dir_z[i];
-        ray.time[i] = 0.0f;
-        ray.tfar[i] = packet->t_far[i];
-        ray.mask[i] = 0xffffffffu;
-        ray.id[i] = 0;
-        ray.flags[i] = 0;
-    }
+    fill_rays(packet, &ray);
     if (rt->scenes[set - 1])
         trace_occluded16(packet->valid, rt->scenes[set - 1], false, &ray);
     if (!rt->moving[set - 1])
