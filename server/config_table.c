@@ -141,8 +141,7 @@ static const struct gn_option table[] = {
      .default_value = "linear",
      .help = "Where the shadow is multiplied in: in linear light, or on the picture's codes, as in "
              "the paper. Frames of quality seed always use the codes."},
-    {ROOM, .key = "match", .type = GN_OPTION_SET, .choices = GN_MATCH_NAMES,
-     .default_value = "all",
+    {ROOM, .key = "match", .type = GN_OPTION_SET, .choices = GN_MATCH_NAMES, .default_value = "all",
      .help = "What of their cameras virtual pixels are given; the rest counts as if nobody had "
              "said it. docs/frames.md explains each."},
     {ROOM, .key = "allow-reference", .type = GN_OPTION_BOOL, .default_value = "true",

@@ -2,13 +2,14 @@
 /* SPDX-License-Identifier: ISC */
 /* The light thread: the probes' newest environment frames, in turn, to published lighting states.
  */
+#include "server/room/light_thread.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/log.h"
 #include "server/room/environment.h"
-#include "server/room/light_thread.h"
 #include "server/room/same_frame.h"
 
 GN_LOG_TOPIC("room");
