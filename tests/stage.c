@@ -75,9 +75,11 @@ void gn_test_stage_set_map(struct gn_test_stage *stage, int width, int height,
         }
     }
     gn_radiance_map_unref(&stage->map);
+    gn_pyramid_unref(&stage->state.pyramid);
     must(gn_radiance_map_create(&frame, NULL, NULL, &stage->map, &error) == 0, "map", &error);
     gn_image_finish(&image);
     stage->state.map = stage->map;
+    must(gn_pyramid_create(stage->map, &stage->state.pyramid) == 0, "pyramid", NULL);
     stage->state.has_sh = true;
     must(gn_irradiance_init_from_map(&stage->state.irradiance, stage->state.sh, stage->map, NULL,
                                      NULL) == 0,
@@ -184,6 +186,7 @@ void gn_test_stage_finish(struct gn_test_stage *stage)
     gn_scene_destroy(&stage->scene);
     gn_pool_destroy(&stage->pool);
     gn_radiance_map_unref(&stage->map);
+    gn_pyramid_unref(&stage->state.pyramid);
     gn_layers_finish(&stage->layers);
     free(stage->lights);
     free(stage->objects);

@@ -251,6 +251,8 @@ static int fill_from_map(struct gn_lighting_state *state, const struct gn_light_
                          struct gn_pool *pool, struct gn_error *out_error)
 {
     int rc = options->no_sh ? 0 : make_harmonics(state, options, pool, out_error);
+    if (rc == 0)
+        rc = gn_lighting_state_add_pyramid(state, options, out_error);
     if (rc == 0 && !options->no_lights)
         rc = make_lights(state, options, pool, out_error);
     if (rc < 0)
@@ -346,6 +348,8 @@ int gn_lighting_state_complete(const struct gn_lighting_state *state,
         return gn_error_set(out_error, -ENOMEM, "lighting state: no memory");
     if (!options->no_sh && !state->has_sh)
         rc = make_harmonics(made, options, pool, out_error);
+    if (rc == 0)
+        rc = gn_lighting_state_add_pyramid(made, options, out_error);
     if (rc == 0 && !options->no_lights && !state->has_lights)
         rc = make_lights(made, &with_tables, pool, out_error);
     if (rc == 0 && state->temporal && (rc = complete_in_time(made, state, options)) < 0)

@@ -10,6 +10,7 @@
 
 #include "server/light/emitters.h"
 #include "server/light/irradiance.h"
+#include "server/light/pyramid.h"
 #include "server/light/radiance_map.h"
 
 struct gn_light_memory;   // server/light/lights.h
@@ -111,6 +112,7 @@ struct gn_light_options {
     bool no_sh;    // leave the SH irradiance out
     struct gn_irradiance_options irradiance;
     bool no_lights;   // leave the lights out
+    bool want_pyramid; // make the map's pyramid, for glossy materials; default: leave it out
     double smoothing; // s, time constant by which light at rest follows the frames, [0, 10]; 0: off
     uint64_t stream;  // whose frame it is; only light of the same stream is followed
     const struct gn_lighting_state *previous; // borrowed during the call, may be NULL: the last
@@ -154,6 +156,7 @@ struct gn_light_figures {
 struct gn_lighting_state {
     _Atomic int references;
     struct gn_radiance_map *map; // shared (ref), never NULL
+    struct gn_pyramid *pyramid;  // of the map; shared (ref); NULL: it was not asked for
     bool has_sh;
     double sh[GN_SH_MAX][3];         // L_lm of all light, world axes; 0 above irradiance.order
     struct gn_irradiance irradiance; // of any normal

@@ -3,6 +3,7 @@
 /* References to lighting states, and copies of them. */
 #include "server/light/state_copy.h"
 
+#include <errno.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -34,6 +35,8 @@ struct gn_lighting_state *gn_lighting_state_copy(const struct gn_lighting_state 
     copy->emission = NULL;
     copy->temporal = NULL;
     (void)gn_radiance_map_ref(copy->map);
+    if (copy->pyramid)
+        (void)gn_pyramid_ref(copy->pyramid);
     if (copy->plan)
         (void)gn_partition_plan_ref(copy->plan);
     if (copy->memory)
@@ -41,6 +44,17 @@ struct gn_lighting_state *gn_lighting_state_copy(const struct gn_lighting_state 
     for (int i = 0; i < copy->n_others; i++)
         (void)gn_lighting_state_ref(copy->others[i]);
     return copy;
+}
+
+int gn_lighting_state_add_pyramid(struct gn_lighting_state *state,
+                                  const struct gn_light_options *options,
+                                  struct gn_error *out_error)
+{
+    if (!options->want_pyramid || state->pyramid)
+        return 0;
+    return gn_pyramid_create(state->map, &state->pyramid) < 0
+               ? gn_error_set(out_error, -ENOMEM, "the map's pyramid: no memory")
+               : 0;
 }
 
 struct gn_lighting_state *gn_lighting_state_ref(struct gn_lighting_state *state)
@@ -60,6 +74,7 @@ void gn_lighting_state_unref(struct gn_lighting_state **state)
     for (int i = 0; i < s->n_others; i++)
         gn_lighting_state_unref(&s->others[i]);
     gn_partition_plan_unref(&s->plan);
+    gn_pyramid_unref(&s->pyramid);
     gn_radiance_map_unref(&s->map);
     gn_emission_unref(&s->emission);
     free(s->near);
