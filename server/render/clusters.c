@@ -198,10 +198,22 @@ static void set_corners(const struct box *box, float *const vertices[static 3], 
     }
 }
 
+/** Of triangles with holes in them the edges say little. */
+static bool has_cutouts(const struct build *build, int c)
+{
+    for (int i = 0; i < build->size[c]; i++) {
+        const struct member *member = &build->members[build->first[c] + i];
+        if (gn_mesh_has_cutouts(&build->scene->objects[member->object].mesh))
+            return true;
+    }
+    return false;
+}
+
 static void fill_cluster(const struct build *build, int c, struct clusters *out)
 {
     struct cluster *cluster = &out->cluster[out->n++];
-    bool keeps = build->size[c] <= CLUSTER_TRIANGLES && build->mover[c] != CLUSTER_MIXED;
+    bool keeps = build->size[c] <= CLUSTER_TRIANGLES && build->mover[c] != CLUSTER_MIXED &&
+                 !has_cutouts(build, c);
     cluster->box = EMPTY_BOX;
     cluster->mover = build->mover[c];
     cluster->first_vertex = out->n_vertices;

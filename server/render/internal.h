@@ -51,9 +51,11 @@ struct sample {
     struct gn_surface surface;
     float org[3]; // of rays that leave the surface: its point, moved off it
 
-    // Virtual: what is seen after mirrors: a diffuse surface, or the environment's radiance.
-    bool is_lit;                  // surface, org are of a diffuse surface that shading has to light
+    // Virtual: what is seen after mirrors: another surface, or the environment's radiance. Once
+    // glossy reflection is added, the albedo is that of the surface's diffuse base.
+    bool is_lit;                  // surface, org are of a surface that shading has to light
     float through[3];             // share of its radiance that reaches the camera
+    float seen_dir[3];            // unit, of the ray that met surface
     float weights[GN_PROBES_MAX]; // of the probes at the surface; with one probe not used
     double radiance[3];           // virtual: what the camera sees, W/(sr m^2)
     double indirect[3];           // the part of it that came by bounces
@@ -256,7 +258,7 @@ struct scratch {
 struct tile_figures {
     double s_primary, s_shade, s_shadow;
     uint64_t rays_primary, rays_mirror, rays_shade, rays_shadow;
-    uint64_t n_mirrors, n_lit, n_receivers, n_rays_real;
+    uint64_t n_mirrors, n_glossy, n_lit, n_receivers, n_rays_real;
     uint64_t n_near; // near lights that reach a sample
     double error_sum;
     int64_t error_n;
@@ -284,6 +286,7 @@ struct frame {
     float margin;                    // m, by which boxes are widened
     // By role, NULL: not made. The real ones are without what is flat.
     const struct silhouette *real_silhouettes, *virtual_silhouettes; // [lights->n]
+    float pixel_angle; // rad, between neighbouring pixels' rays; for pictures on meshes
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
     struct near_lights near;         // of the state; reference: finer
     const struct places *places;     // reference in the global model; else none
@@ -345,6 +348,20 @@ void gn_shade_reflect(const struct gn_surface *surface, float dir[static 3]);
 /** Lights the virtual samples of scratch by the frame's lights or the SH irradiance. */
 void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
                       struct tile_figures *figures);
+
+/** Irradiance of the surface of a sample that is none of scratch's, by the frame's lights or the SH
+ * irradiance and by near lights, with what hides them. Of `stride` lights only each one is tried
+ * that comes as `first`th, for all of them: the mean over all first is exact. */
+void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
+                             const struct sample *sample, int first, int stride,
+                             double out_irradiance[static 3], struct tile_figures *figures);
+
+/* specular.c */
+
+/** Adds what ggx and glass surfaces of the virtual samples reflect and let through, and what file
+ * materials send themselves; leaves the diffuse base to shading. */
+void gn_specular_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                       struct tile_figures *figures);
 
 /* shadow.c */
 
@@ -499,6 +516,11 @@ void gn_bounce_gather(const struct frame *frame, const struct sample *start, enu
                       int n_paths, double out_common[static 3], double out_touched[static 3],
                       uint64_t *rays);
 
+/** Mean of n_paths random walks from the ggx or glass surface of a sample into its reflection and
+ * refraction: that share of its radiance. */
+void gn_bounce_gather_specular(const struct frame *frame, const struct sample *start, int n_paths,
+                               double out_radiance[static 3], uint64_t *rays);
+
 /* refine.c */
 
 extern const struct refine_rule gn_refine_rules[3]; // by enum gn_quality
@@ -573,11 +595,11 @@ static inline int get_probe(const struct light_list *lights, int l)
     return probe;
 }
 
-/** Cosine by which light from dir reaches the surface; 0 where either normal looks away. */
+/** Cosine by which light from dir reaches the surface; 0 where it comes from under the horizon. */
 static inline float surface_cosine(const struct gn_surface *surface, const float dir[static 3])
 {
     float c = dot3(surface->normal_shading, dir);
-    return c > 0 && dot3(surface->normal_geometric, dir) > 0 ? c : 0;
+    return c > 0 && dot3(surface->normal_horizon, dir) > 0 ? c : 0;
 }
 
 #endif

@@ -107,7 +107,7 @@ static bool is_above(const struct gn_surface *surface, const double dir[static 3
     double geometric = 0;
     for (int k = 0; k < 3; k++) {
         shading += surface->normal_shading[k] * dir[k];
-        geometric += surface->normal_geometric[k] * dir[k];
+        geometric += surface->normal_horizon[k] * dir[k];
     }
     return shading > 0 && geometric > 0;
 }

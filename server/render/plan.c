@@ -5,11 +5,12 @@
 #include <math.h>
 
 /** The plan's lines, in the order of the passes. */
-enum line { PRIMARY, REFINE, SHADE, MIRROR, SHADOW, BLOCKERS, NEAR, ADDED, N_LINES };
+enum line { PRIMARY, REFINE, SHADE, MIRROR, GLOSSY, SHADOW, BLOCKERS, NEAR, ADDED, N_LINES };
 
 static const char *const pass_names[N_LINES] = {
-    [PRIMARY] = "primary", [REFINE] = "refine",     [SHADE] = "shade", [MIRROR] = "mirror",
-    [SHADOW] = "shadow",   [BLOCKERS] = "blockers", [NEAR] = "near",   [ADDED] = "added",
+    [PRIMARY] = "primary",   [REFINE] = "refine", [SHADE] = "shade",
+    [MIRROR] = "mirror",     [GLOSSY] = "glossy", [SHADOW] = "shadow",
+    [BLOCKERS] = "blockers", [NEAR] = "near",     [ADDED] = "added",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -71,15 +72,9 @@ static bool is_real_flat(const struct frame *frame)
     return false;
 }
 
-static bool has_virtual_mirror(const struct frame *frame)
+static bool has_virtual(const struct frame *frame, unsigned types)
 {
-    for (int i = 0; i < frame->scene->n_objects; i++) {
-        const struct gn_scene_object *object = &frame->scene->objects[i];
-        if (object->role == GN_RT_VIRTUAL && object->has_material &&
-            object->material.type == GN_MATERIAL_MIRROR)
-            return true;
-    }
-    return false;
+    return (frame->scene->virtual_materials & types) != 0;
 }
 
 static const char *why_not_virtual(const struct frame *frame, const double slopes[static 4])
@@ -159,9 +154,14 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     const char *no_virtual = all ? NULL : why_not_virtual(frame, slopes);
     const char *no_loop = why_not_light_loop(frame);
     set_line(report, SHADE, no_virtual ? no_virtual : no_loop, "virtual objects may be in view");
-    const char *no_mirror =
-        has_virtual_mirror(frame) ? no_virtual : "no mirror among the virtual objects";
+    const char *no_mirror = has_virtual(frame, 1u << GN_MATERIAL_MIRROR)
+                                ? no_virtual
+                                : "no mirror among the virtual objects";
     set_line(report, MIRROR, no_mirror, "a mirror among the virtual objects");
+    bool has_glossy = has_virtual(frame, 1u << GN_MATERIAL_GGX | 1u << GN_MATERIAL_GLASS);
+    set_line(report, GLOSSY,
+             has_glossy ? no_virtual : "neither ggx nor glass among the virtual objects",
+             "ggx or glass among the virtual objects");
 
     const char *no_shadow = options->no_shadow ? "not asked for"
                             : all              ? NULL
@@ -179,8 +179,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
             : "lamps and emissive meshes are tried from each surface");
     bool can_add = frame->run_bounces || frame->near.n_virtual > 0;
     set_line(report, ADDED,
-             !can_add ? "0 bounces: nothing is added; caustics of mirrors are not built"
-                      : no_shadow,
+             !can_add
+                 ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
+                 : no_shadow,
              why_added(frame));
 }
 
@@ -199,6 +200,7 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
     withdraw(report, REFINE, sum->n_refined_pixels == 0, "no edge in view");
     withdraw(report, SHADE, sum->n_lit == 0, "no pixel shows a diffuse virtual surface");
     withdraw(report, MIRROR, sum->n_mirrors == 0, "no pixel shows a virtual mirror");
+    withdraw(report, GLOSSY, sum->n_glossy == 0, "no pixel shows a ggx or glass surface");
     withdraw(report, BLOCKERS, sum->n_receivers == 0, "no diffuse real surface in view");
     withdraw(report, SHADOW, sum->n_receivers == 0, "no diffuse real surface in view");
     withdraw(report, BLOCKERS, sum->n_rays_real == 0, "no pixel loses light to a virtual object");

@@ -89,14 +89,15 @@ static void take_hit(const struct frame *frame, struct sample *s, const struct g
                      struct tile_figures *figures)
 {
     const struct gn_surface *surface = &s->surface;
-    gn_scene_get_surface(frame->scene, s->dir, hit, &s->surface);
+    gn_scene_get_surface_filtered(frame->scene, s->dir, hit, hit->distance * frame->pixel_angle,
+                                  &s->surface);
     s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
     s->object = hit->object;
     s->depth = hit->distance * s->dir_z;
-    gn_rt_offset_origin(surface->point, surface->normal_geometric, surface->clearance,
-                        surface->normal_geometric, s->org);
-    // A shadow is less light on a diffuse surface; a real mirror shows other things.
-    s->is_receiver = s->kind == SAMPLE_REAL && surface->material == GN_MATERIAL_DIFFUSE;
+    gn_surface_get_origin(surface, s->org);
+    // A shadow is less light on a diffuse surface; real mirrors and glass show other things.
+    s->is_receiver = s->kind == SAMPLE_REAL && (surface->material == GN_MATERIAL_DIFFUSE ||
+                                                surface->material == GN_MATERIAL_GGX);
     figures->n_receivers += s->is_receiver;
 }
 

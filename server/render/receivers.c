@@ -27,7 +27,7 @@ void gn_receivers_add(struct receivers *r, const struct sample *samples, int i, 
     for (int k = 0; k < 3; k++) {
         r->org[k][j] = s->org[k];
         r->shading[k][j] = s->surface.normal_shading[k];
-        r->geometric[k][j] = s->surface.normal_geometric[k];
+        r->geometric[k][j] = s->surface.normal_horizon[k];
     }
     for (int p = 0; p < n_probes && n_probes > 1; p++)
         r->weights[p][j] = s->weights[p];

@@ -24,7 +24,7 @@ static unsigned get_cosines(const struct light_list *lights, const struct sample
     const float *y = lights->dir[1] + block * LANES;
     const float *z = lights->dir[2] + block * LANES;
     const float *n = s->surface.normal_shading;
-    const float *g = s->surface.normal_geometric;
+    const float *g = s->surface.normal_horizon;
     unsigned mask = 0;
     for (int i = 0; i < LANES; i++) {
         float c = n[0] * x[i] + n[1] * y[i] + n[2] * z[i];
@@ -42,8 +42,8 @@ static void split_by_horizon(const struct direction_boxes *boxes, const struct s
 {
     unsigned some;
     unsigned all;
-    gn_directions_split(boxes, s->surface.normal_geometric, out_some, out_all);
-    if (memcmp(s->surface.normal_geometric, s->surface.normal_shading,
+    gn_directions_split(boxes, s->surface.normal_horizon, out_some, out_all);
+    if (memcmp(s->surface.normal_horizon, s->surface.normal_shading,
                sizeof(s->surface.normal_shading)) == 0)
         return;
     gn_directions_split(boxes, s->surface.normal_shading, &some, &all);
@@ -187,7 +187,7 @@ static int find_near(const struct frame *frame, struct scratch *scratch, const s
     int n = 0;
     for (int i = 0; i < 2; i++) {
         if (set & frame->clusters[i].role)
-            n = gn_clusters_list_above(&frame->clusters[i], s->org, s->surface.normal_geometric,
+            n = gn_clusters_list_above(&frame->clusters[i], s->org, s->surface.normal_horizon,
                                        frame->margin, n, scratch->near, scratch->outlines);
     }
     return n;
@@ -357,9 +357,10 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
         if (frame->run_bounces)
             gn_bounce_gather(frame, s, GN_RT_ALL, n_paths, common, touched, &figures->rays_shade);
         for (int k = 0; k < 3; k++) {
-            s->indirect[k] = s->through[k] * (common[k] + touched[k]);
-            s->radiance[k] =
-                s->through[k] * (s->surface.albedo[k] / M_PI * sums[0][k]) + s->indirect[k];
+            double bounced = s->through[k] * (common[k] + touched[k]);
+            s->indirect[k] += bounced;
+            s->radiance[k] +=
+                s->through[k] * (s->surface.albedo[k] / M_PI * sums[0][k]) + bounced;
         }
         gn_near_add_emission(frame, s);
         if (frame->near.n > 0)

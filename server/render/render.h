@@ -50,6 +50,7 @@ struct gn_render_options {
 struct gn_render_needs {
     const char *why_no_lights;
     const char *why_no_sh; // the harmonics and the irradiance of any normal
+    const char *why_no_pyramid;
 };
 /** For all frames of the scene with these options, of any view. */
 void gn_render_get_needs(const struct gn_scene *scene, const struct gn_render_options *options,

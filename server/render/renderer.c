@@ -167,6 +167,11 @@ static const char *check_light(const struct gn_scene *scene, const struct gn_ble
 {
     struct gn_render_needs needs;
     gn_render_get_needs(scene, options, &needs);
+    for (int i = 0; i < blend->n; i++) {
+        if (!needs.why_no_pyramid && !blend->state[i]->pyramid)
+            return "render: glossy materials need the map's pyramid, which this lighting state "
+                   "leaves out";
+    }
     for (int i = 0; i < blend->n && options->quality != GN_QUALITY_REFERENCE; i++) {
         if (blend->state[i]->n_lights > GN_LIGHTS_MAX)
             return "render: a lighting state has more lights than are used";
@@ -276,6 +281,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     }
     frame->scene = renderer->posed;
     frame->rt = renderer->posed->rt;
+    frame->pixel_angle = (float)(1 / fmax(frame->camera->fx, frame->camera->fy));
     frame->kernels = gn_kernels_get();
     frame->rays = renderer->rays;
     frame->lights = &renderer->lights;

@@ -10,7 +10,7 @@ void gn_shade_reflect(const struct gn_surface *surface, float dir[static 3])
     const float *n = surface->normal_shading;
     float c = 2 * dot3(dir, n);
     float out[3] = {dir[0] - c * n[0], dir[1] - c * n[1], dir[2] - c * n[2]};
-    if (!(dot3(out, surface->normal_geometric) > 0)) { // an interpolated normal may point inside
+    if (!(dot3(out, surface->normal_horizon) > 0)) { // an interpolated normal may point inside
         n = surface->normal_geometric;
         c = 2 * dot3(dir, n);
         for (int k = 0; k < 3; k++)
@@ -45,18 +45,19 @@ static void follow_mirrors(const struct frame *frame, struct sample *s,
             s->is_lit = false;
             return;
         }
-        gn_scene_get_surface(frame->scene, dir, &hit, &s->surface);
+        gn_scene_get_surface_filtered(frame->scene, dir, &hit, hit.distance * frame->pixel_angle,
+                                      &s->surface);
         float pinned[3];
-        if (s->surface.role == GN_RT_REAL && s->surface.material == GN_MATERIAL_DIFFUSE &&
+        if (s->surface.role == GN_RT_REAL && s->surface.material != GN_MATERIAL_MIRROR &&
             gn_blend_get_radiance_at(&frame->blend, s->surface.point, pinned)) {
             for (int k = 0; k < 3; k++)
                 s->radiance[k] = (double)s->through[k] * pinned[k];
             s->is_lit = false;
             return;
         }
-        gn_rt_offset_origin(s->surface.point, s->surface.normal_geometric, s->surface.clearance,
-                            s->surface.normal_geometric, s->org);
+        gn_surface_get_origin(&s->surface, s->org);
     }
+    memcpy(s->seen_dir, dir, sizeof(s->seen_dir));
 }
 
 void gn_shade_follow_mirrors(const struct frame *frame, struct sample *samples, int n,
@@ -67,6 +68,7 @@ void gn_shade_follow_mirrors(const struct frame *frame, struct sample *samples, 
         if (s->kind != SAMPLE_VIRTUAL)
             continue;
         s->is_lit = true;
+        memcpy(s->seen_dir, s->dir, sizeof(s->seen_dir));
         for (int k = 0; k < 3; k++) {
             s->through[k] = 1;
             s->radiance[k] = s->indirect[k] = 0;
@@ -84,17 +86,24 @@ static void reflect_irradiance(struct sample *s, const double irradiance[static 
         s->radiance[k] += (double)s->through[k] * s->surface.albedo[k] / M_PI * irradiance[k];
 }
 
-static void shade_by_irradiance(const struct frame *frame, struct sample *s)
+/** By the SH irradiance. */
+static void look_up_irradiance(const struct frame *frame, const struct sample *s,
+                               double sum[static 3])
 {
     const double normal[3] = {s->surface.normal_shading[0], s->surface.normal_shading[1],
                               s->surface.normal_shading[2]};
-    double sum[3] = {0};
     for (int p = 0; p < frame->blend.n; p++) {
         double e[3];
         gn_irradiance_get(&frame->blend.state[p]->irradiance, normal, e);
         for (int k = 0; k < 3; k++)
             sum[k] += e[k] * (frame->blend.n > 1 ? (double)s->weights[p] : 1);
     }
+}
+
+static void shade_by_irradiance(const struct frame *frame, struct sample *s)
+{
+    double sum[3] = {0};
+    look_up_irradiance(frame, s, sum);
     reflect_irradiance(s, sum);
 }
 
@@ -149,4 +158,40 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
     flush(frame, scratch, irradiance, figures);
     for (int j = 0; j < m; j++)
         reflect_irradiance(&scratch->samples[scratch->lit[j]], irradiance[j]);
+}
+
+void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
+                             const struct sample *s, int first, int stride,
+                             double out_irradiance[static 3], struct tile_figures *figures)
+{
+    const struct light_list *lights = frame->lights;
+    double sum[1][3] = {{0}};
+    bool by_map = frame->options.shading == GN_SHADING_IRRADIANCE;
+    if (by_map)
+        look_up_irradiance(frame, s, sum[0]);
+    for (int l = first; l < lights->n && !by_map; l += stride) {
+        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
+        float c = surface_cosine(&s->surface, dir) * (float)stride;
+        if (frame->blend.n > 1)
+            c *= s->weights[get_probe(lights, l)];
+        if (c > 0 && gn_packet_add(scratch, s->org, dir, 0, l, c, INFINITY))
+            flush(frame, scratch, sum, figures);
+    }
+    flush(frame, scratch, sum, figures);
+    for (int l = first + (by_map ? frame->near.n_placed : 0); l < frame->near.n; l += stride) {
+        const struct gn_near_light *light = &frame->near.lights[l];
+        struct near_ray ray;
+        if (!gn_near_aim(light, s->org, &ray))
+            continue;
+        double weight = ray.weight * (double)surface_cosine(&s->surface, ray.dir) *
+                        gn_placed_get_weight(frame, s, l) * stride;
+        if (!(weight > 0))
+            continue;
+        figures->n_near++;
+        figures->rays_shade++;
+        bool is_hidden = gn_rt_is_occluded(frame->rt, GN_RT_ALL, s->org, ray.dir, 0, ray.length);
+        for (int k = 0; k < 3 && !is_hidden; k++)
+            sum[0][k] += weight * (double)light->intensity[k];
+    }
+    memcpy(out_irradiance, sum[0], sizeof(sum[0]));
 }

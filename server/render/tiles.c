@@ -28,6 +28,7 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
     int64_t t1 = gn_clock_get_monotonic_ns();
     gn_shade_follow_mirrors(frame, scratch->samples, n, figures);
     gn_render_weigh_probes(frame, scratch->samples, n);
+    gn_specular_shade(frame, scratch, n, n_paths, figures);
     if (is_reference)
         gn_reference_shade(frame, scratch, n, n_paths, figures);
     else

@@ -122,6 +122,7 @@ static int read_probe(const struct gn_cli_request *request, const struct gn_scen
     memcpy(frame.position, setup.world_from_probe.translation, sizeof(frame.position));
     struct gn_light_options light = request->light;
     light.no_sh = needs->why_no_sh && !request->report && !request->irradiance_map;
+    light.want_pyramid = !needs->why_no_pyramid;
     light.no_lights = needs->why_no_lights && !request->light_map;
     const struct gn_radiance_map_options map = {.model =
                                                     scene->model == GN_MODEL_GLOBAL ? scene : NULL};

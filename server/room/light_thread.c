@@ -16,7 +16,7 @@ GN_LOG_TOPIC("room");
 
 /** What of a lighting state somebody in the room can use now. */
 struct wants {
-    bool sh, lights;
+    bool sh, lights, pyramid;
 };
 
 /** What there is to do. */
@@ -49,14 +49,16 @@ static struct wants get_wants_locked(const struct gn_room *room) GN_REQUIRES(roo
 {
     bool is_looked_at = room->light_asked_ns > 0 &&
                         gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
-    return (struct wants){.sh = !room->needs.why_no_sh || room->n_subscribers > 0,
+    return (struct wants){.pyramid = !room->needs.why_no_pyramid,
+                          .sh = !room->needs.why_no_sh || room->n_subscribers > 0,
                           .lights = !room->needs.why_no_lights || room->n_subscribers > 0 ||
                                     is_looked_at};
 }
 
 static bool lacks(const struct gn_lighting_state *light, struct wants wants)
 {
-    return (wants.sh && !light->has_sh) || (wants.lights && !light->has_lights);
+    return (wants.sh && !light->has_sh) || (wants.lights && !light->has_lights) ||
+           (wants.pyramid && !light->pyramid);
 }
 
 /** False where completing it has failed: that is tried again with the next frame only. */
@@ -196,6 +198,7 @@ static struct gn_light_options get_light_options(const struct gn_room *room, str
 {
     struct gn_light_options options = room->options.light;
     options.no_sh = !wants.sh;
+    options.want_pyramid = wants.pyramid;
     options.no_lights = !wants.lights;
     return options;
 }

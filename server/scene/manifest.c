@@ -2,7 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * scene.json: {"objects": [{"mesh", "role", "name", "material", "world_from_object", "movable"}],
- * "lights": [...]}; what sends light is read in manifest_light.c.
+ * "lights": [...]}; materials are read in manifest_material.c, what sends light in
+ * manifest_light.c.
  */
 #include "server/scene/manifest.h"
 
@@ -12,15 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/log.h"
 #include "common/pose.h"
+
+GN_LOG_TOPIC("scene");
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
 
 // Longest "name".
 #define MAX_NAME 255
-
-static const char *const material_names[] = {"diffuse", "mirror"}; // enum gn_material_type
-static const char *const unbuilt_materials[] = {"glass", "ggx"};
 
 /** path of the mesh: as it is where absolute, else beside the manifest. */
 static int join_path(const char *manifest, const char *mesh, char out[static PATH_MAX])
@@ -29,60 +30,6 @@ static int join_path(const char *manifest, const char *mesh, char out[static PAT
     int n_folder = mesh[0] != '/' && slash ? (int)(slash - manifest) + 1 : 0;
     int n = snprintf(out, PATH_MAX, "%.*s%s", n_folder, manifest, mesh);
     return n < 0 || n >= PATH_MAX ? -ENAMETOOLONG : 0;
-}
-
-static int read_material_type(const struct gn_json *material, int *out_type,
-                              struct gn_error *out_error)
-{
-    const char *name = NULL;
-    int ret = gn_json_get_string(material, "type", &name, out_error);
-    if (ret < 0)
-        return ret;
-    for (size_t i = 0; i < LENGTH(unbuilt_materials); i++) {
-        if (strcmp(name, unbuilt_materials[i]) == 0)
-            return gn_json_refuse(material, "type", out_error,
-                                  "\"%s\" is not built yet; diffuse and mirror are", name);
-    }
-    return gn_json_get_enum(material, "type", material_names, LENGTH(material_names), out_type,
-                            out_error);
-}
-
-static int read_material(const struct gn_json *item, struct gn_scene_object *object,
-                         struct gn_error *out_error)
-{
-    static const char *const keys[] = {"type", "albedo",   "roughness",       "metallic",
-                                       "ior",  "emission", "emission_stream", "emission_scale"};
-    static const char *const refused[] = {"roughness", "metallic", "ior"};
-    if (!gn_json_has(item, "material"))
-        return 0;
-    struct gn_json material = {0};
-    int type = 0;
-    int ret = gn_json_get_object(item, "material", &material, out_error);
-    if (ret == 0)
-        ret = gn_json_check_keys(&material, keys, LENGTH(keys), out_error);
-    if (ret == 0)
-        ret = read_material_type(&material, &type, out_error);
-    if (ret < 0)
-        return ret;
-    for (size_t i = 0; i < LENGTH(refused); i++) {
-        if (gn_json_has(&material, refused[i]))
-            return gn_json_refuse(&material, refused[i], out_error, "a %s material has none",
-                                  material_names[type]);
-    }
-    double albedo[3] = {1.0, 1.0, 1.0};
-    bool has_albedo = gn_json_has(&material, "albedo");
-    if (has_albedo && (ret = gn_json_get_numbers(&material, "albedo", 3, albedo, out_error)) < 0)
-        return ret;
-    for (int k = 0; k < 3; k++) {
-        if (!(albedo[k] >= 0.0 && albedo[k] <= 1.0))
-            return gn_json_refuse(&material, "albedo", out_error,
-                                  "%g is outside [0, 1]: reflectance, linear Rec.709", albedo[k]);
-        object->material.albedo[k] = (float)albedo[k];
-    }
-    object->material.type = (enum gn_material_type)type;
-    // Diffuse without an albedo: the mesh's own colours.
-    object->has_material = has_albedo || type != GN_MATERIAL_DIFFUSE;
-    return gn_manifest_read_emission(&material, object, out_error);
 }
 
 static int read_name(const struct gn_json *item, const char *mesh, struct gn_scene_object *object,
@@ -133,6 +80,8 @@ static int read_mesh(const struct gn_json *item, const char *mesh, struct gn_sce
         (void)gn_json_refuse(item, "mesh", out_error, "%s", reason.text);
         return ret;
     }
+    if (object->mesh.ignored)
+        gn_log(GN_LOG_WARN, "%s: asks for what is not done: %s", path, object->mesh.ignored);
     return 0;
 }
 
@@ -153,7 +102,7 @@ static int read_object(const struct gn_json *item, struct gn_scene_object *objec
     if (ret == 0)
         ret = read_name(item, mesh, object, out_error);
     if (ret == 0)
-        ret = read_material(item, object, out_error);
+        ret = gn_manifest_read_material(item, object, out_error);
     if (ret == 0)
         ret = read_transform(item, object, out_error);
     if (ret == 0 && gn_json_has(item, "movable"))

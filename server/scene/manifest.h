@@ -9,6 +9,12 @@
 #include "common/json.h"
 #include "server/scene/scene.h"
 
+/** "material" of an object, which may be absent. 0 or a negative errno and a sentence; what was
+ * read till then is the object's. */
+GN_MUST_USE int gn_manifest_read_material(const struct gn_json *item,
+                                          struct gn_scene_object *object,
+                                          struct gn_error *out_error);
+
 /** "emission", "emission_stream" and "emission_scale" of a material into the object. 0 or a
  * negative errno and a sentence; what was read till then is the object's. */
 GN_MUST_USE int gn_manifest_read_emission(const struct gn_json *material,

@@ -84,15 +84,6 @@ static int check_materials(struct gn_mesh *mesh, struct gn_error *out_error)
     return 0;
 }
 
-bool gn_mesh_has_cutouts(const struct gn_mesh *mesh)
-{
-    for (int i = 0; mesh->material && i < mesh->n_materials; i++) {
-        if (mesh->materials[i].alpha_cutoff > 0)
-            return true;
-    }
-    return false;
-}
-
 static int check_triangles(const struct gn_mesh *mesh, struct gn_error *out_error)
 {
     for (int i = 0; i < mesh->n_triangles; i++) {

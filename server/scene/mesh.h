@@ -43,6 +43,9 @@ struct gn_mesh {
 
 /** True where parts of triangles may be cut out by their material's alpha. */
 bool gn_mesh_has_cutouts(const struct gn_mesh *mesh);
+/** True where such a mesh is not there; u, v barycentric as of gn_rt_hit. Its base colour's alpha
+ * by the picture's finest level. Thread-safety: safe. */
+bool gn_mesh_is_cut_out(const struct gn_mesh *mesh, uint32_t triangle, float u, float v);
 
 /** Frees the arrays and zeroes *mesh. */
 void gn_mesh_finish(struct gn_mesh *mesh);
@@ -58,10 +61,12 @@ GN_MUST_USE int gn_mesh_check(struct gn_mesh *mesh, int *out_dropped, struct gn_
  * into triangles, node transforms applied, points and lines left out. Normals are the file's own,
  * and where it has none the mesh is flat: nothing is smoothed by guess. Unusable normals (zero, not
  * finite) become the mean of their triangles'. Albedos are the materials' diffuse or base colours,
- * taken as linear Rec.709; NULL where the file has no material. Texture coordinates are
- * kept (the first set; v = 0 is the picture's bottom edge), textures and vertex colours not read.
+ * taken as linear Rec.709; NULL where the file has no material. Of glTF the materials are read as
+ * its section 3.9 has them, with their pictures (PNG and JPEG, in the file or in its folder and
+ * below), instead of albedos. Texture coordinates are kept (the first set; v = 0 is the picture's
+ * bottom edge), vertex colours not read.
  * Returns 0 or a negative errno and a sentence naming the file: not finite, empty, too large, a
- * colour outside [0, 1], a kind of file that is not read.
+ * colour outside [0, 1], a picture outside the file's folder, a kind of file that is not read.
  */
 GN_MUST_USE int gn_mesh_read_file(const char *path, struct gn_mesh *out_mesh,
                                   struct gn_error *out_error);

@@ -21,11 +21,10 @@
 #include <assimp/scene.h>
 
 #include "common/pose.h"
+#include "server/scene/mesh_import.h"
 
 // Largest mesh file, bytes: Assimp reads it whole, and takes some ten times as much.
 #define MAX_FILE_BYTES (1L << 30)
-// Largest header of a PLY file, bytes.
-#define MAX_PLY_HEADER 65536
 // Deepest nesting of nodes.
 #define MAX_DEPTH 256
 // Albedo of triangles without a material where others of the file have one.
@@ -39,6 +38,8 @@ struct importer {
     bool has_normals;       // some mesh of the file has: all get them
     bool has_uvs;           // some mesh of the file has: all get them, 0 where they have none
     bool has_albedos;       // some mesh of the file has a material: all get albedos
+    bool has_materials;     // glTF: instead of albedos
+    bool has_tangents;      // glTF: some mesh of the file has
     long n_vertices;
     long n_triangles;
     struct gn_mesh *mesh; // NULL while counting
@@ -49,45 +50,6 @@ static bool has_suffix(const char *path, const char *suffix)
     size_t n = strlen(path);
     size_t m = strlen(suffix);
     return n > m && strcasecmp(path + n - m, suffix) == 0;
-}
-
-/** Refuses PLY headers that Assimp reads for ever or takes all memory for: without end, with more
- * elements than the file has bytes, or with lists counted in 32 bits. */
-static int check_ply_header(const char *path, struct gn_error *out_error)
-{
-    char header[MAX_PLY_HEADER + 1];
-    FILE *file = fopen(path, "rbe");
-    if (!file)
-        return gn_error_set(out_error, -errno, "%s: cannot read the mesh: %s", path,
-                            strerror(errno));
-    size_t size = fread(header, 1, MAX_PLY_HEADER, file);
-    struct stat info = {0};
-    bool failed = ferror(file) != 0 || fstat(fileno(file), &info) != 0;
-    fclose(file);
-    if (failed)
-        return gn_error_set(out_error, -EIO, "%s: cannot read the mesh", path);
-    header[size] = '\0'; // the text ends at the first NUL, if any
-    const char *end = strstr(header, "end_header");
-    if (!end)
-        return gn_error_set(out_error, -EINVAL, "%s: its PLY header has no end_header in %d bytes",
-                            path, MAX_PLY_HEADER);
-    for (const char *line = header; (line = strstr(line, "element")) && line < end; line++) {
-        long long count = 0;
-        if (sscanf(line, "element %*63s %18lld", &count) == 1 &&
-            (count < 0 || count > (long long)info.st_size))
-            return gn_error_set(out_error, -EINVAL,
-                                "%s: its PLY header promises %lld elements in %lld bytes", path,
-                                count, (long long)info.st_size);
-    }
-    for (const char *line = header; (line = strstr(line, "property list")) && line < end; line++) {
-        char type[16] = "";
-        if (sscanf(line, "property list %15s", type) == 1 && !strstr(type, "char") &&
-            !strstr(type, "short") && !strstr(type, "int8") && !strstr(type, "int16"))
-            return gn_error_set(out_error, -EINVAL,
-                                "%s: its PLY lists are counted as %s; uchar and ushort are read",
-                                path, type);
-    }
-    return 0;
 }
 
 static int check_file(const char *path, struct gn_error *out_error)
@@ -106,7 +68,7 @@ static int check_file(const char *path, struct gn_error *out_error)
         return gn_error_set(out_error, -EINVAL,
                             "%s: unknown kind of mesh file; .obj, .gltf, .glb and .ply are read",
                             path);
-    return has_suffix(path, ".ply") ? check_ply_header(path, out_error) : 0;
+    return has_suffix(path, ".ply") ? gn_mesh_check_ply_header(path, out_error) : 0;
 }
 
 /** Only triangles are taken; points and lines are no surface. */
@@ -152,6 +114,9 @@ static int check_part(struct importer *im, unsigned index, const struct aiMesh *
     const struct aiMesh *part = scene->mMeshes[index];
     if ((part->mNumVertices > 0 && !part->mVertices) || (part->mNumFaces > 0 && !part->mFaces))
         return gn_error_set(im->error, -EINVAL, "%s: mesh %u has no data", im->path, index);
+    if (im->has_materials && part->mMaterialIndex >= scene->mNumMaterials)
+        return gn_error_set(im->error, -EINVAL, "%s: mesh %u names material %u of %u", im->path,
+                            index, part->mMaterialIndex, scene->mNumMaterials);
     *out_part = part;
     return 0;
 }
@@ -193,6 +158,34 @@ static void transform_normal(const double inverse[static 16], const struct aiVec
         out[k] = (float)(n[k] * scale);
 }
 
+static double dot3(const double a[static 3], const double b[static 3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** The tangent turned with the mesh, unit, and the side of n x t on which the bitangent is; where
+ * there is none, any tangent. */
+static void fill_tangent(const struct aiMesh *part, unsigned index, const double m[static 16],
+                         const float normal[static 3], float out[static 4])
+{
+    const double n[3] = {normal[0], normal[1], normal[2]};
+    double t[3] = {0};
+    double b[3] = {0};
+    for (int k = 0; k < 3 && part->mTangents && part->mBitangents; k++) {
+        const struct aiVector3D *v = &part->mTangents[index];
+        const struct aiVector3D *w = &part->mBitangents[index];
+        t[k] = m[4 * k] * v->x + m[4 * k + 1] * v->y + m[4 * k + 2] * v->z;
+        b[k] = m[4 * k] * w->x + m[4 * k + 1] * w->y + m[4 * k + 2] * w->z;
+    }
+    const double cross[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2],
+                             n[0] * t[1] - n[1] * t[0]};
+    double length = sqrt(dot3(t, t));
+    bool ok = length > 0 && isfinite(length);
+    for (int k = 0; k < 3; k++)
+        out[k] = ok ? (float)(t[k] / length) : (float)(k == 0);
+    out[3] = dot3(cross, b) < 0 ? -1.0f : 1.0f;
+}
+
 /** Appends a vertex of the part; its normal, too, where the file has them. */
 static uint32_t add_vertex(struct importer *im, const struct aiMesh *part, unsigned index,
                            const double m[static 16], const double inverse[static 16])
@@ -201,6 +194,9 @@ static uint32_t add_vertex(struct importer *im, const struct aiMesh *part, unsig
     transform_position(m, &part->mVertices[index], im->mesh->positions + at);
     if (part->mNormals)
         transform_normal(inverse, &part->mNormals[index], im->mesh->normals + at);
+    if (im->mesh->tangents)
+        fill_tangent(part, index, m, im->mesh->normals + at,
+                     im->mesh->tangents + 4 * (size_t)im->mesh->n_vertices);
     const struct aiVector3D *uvs = part->mTextureCoords[0];
     if (uvs && im->mesh->uvs) {
         im->mesh->uvs[2 * (size_t)im->mesh->n_vertices] = uvs[index].x;
@@ -234,6 +230,8 @@ static int fill_part(struct importer *im, const struct aiMesh *part, const doubl
         }
         if (mesh->albedos)
             memcpy(mesh->albedos + 3 * (size_t)mesh->n_triangles, albedo, sizeof(albedo));
+        if (mesh->material)
+            mesh->material[mesh->n_triangles] = (uint16_t)part->mMaterialIndex;
         mesh->n_triangles++;
     }
     return 0;
@@ -361,6 +359,10 @@ static int allocate(struct importer *im, struct gn_mesh *mesh)
         return -ENOMEM;
     if (im->has_uvs && !(mesh->uvs = calloc(n_vertices, 2 * sizeof(*mesh->uvs))))
         return -ENOMEM;
+    if (im->has_tangents && !(mesh->tangents = calloc(n_vertices, 4 * sizeof(*mesh->tangents))))
+        return -ENOMEM;
+    if (im->has_materials && !(mesh->material = calloc(n_triangles, sizeof(*mesh->material))))
+        return -ENOMEM;
     if (im->has_albedos && !(mesh->albedos = calloc(n_triangles, 3 * sizeof(*mesh->albedos))))
         return -ENOMEM;
     return 0;
@@ -374,7 +376,9 @@ static void find_attributes(struct importer *im)
         float albedo[3];
         im->has_normals |= part && part->mNormals;
         im->has_uvs |= part && part->mTextureCoords[0];
-        im->has_albedos |= part && get_albedo(im, part, albedo);
+        im->has_albedos |= part && !im->has_materials && get_albedo(im, part, albedo);
+        im->has_tangents |=
+            part && im->has_materials && part->mTangents && part->mBitangents && part->mNormals;
     }
 }
 
@@ -389,6 +393,9 @@ static int import(struct importer *im, struct gn_mesh *mesh)
     if (im->n_triangles == 0)
         return gn_error_set(im->error, -EINVAL, "%s: the mesh is empty: it has no triangle",
                             im->path);
+    if (im->has_materials &&
+        (ret = gn_mesh_read_materials(im->path, im->scene, mesh, im->error)) < 0)
+        return ret;
     ret = allocate(im, mesh);
     if (ret < 0)
         return gn_error_set(im->error, ret, "%s: no memory for %ld triangles", im->path,
@@ -412,13 +419,15 @@ int gn_mesh_read_file(const char *path, struct gn_mesh *out_mesh, struct gn_erro
     int ret = check_file(path, out_error);
     if (ret < 0)
         return ret;
-    const struct aiScene *scene =
-        aiImportFile(path, aiProcess_ValidateDataStructure | aiProcess_Triangulate |
-                               aiProcess_JoinIdenticalVertices);
+    bool is_gltf = has_suffix(path, ".gltf") || has_suffix(path, ".glb");
+    const struct aiScene *scene = aiImportFile(
+        path, aiProcess_ValidateDataStructure | aiProcess_Triangulate |
+                  aiProcess_JoinIdenticalVertices | (is_gltf ? aiProcess_CalcTangentSpace : 0u));
     if (!scene)
         return gn_error_set(out_error, -EINVAL, "%s: cannot read the mesh: %s", path,
                             aiGetErrorString());
-    struct importer im = {.path = path, .scene = scene, .error = out_error};
+    struct importer im = {
+        .path = path, .scene = scene, .error = out_error, .has_materials = is_gltf};
     ret = import(&im, &mesh);
     aiReleaseImport(scene);
     if (ret < 0) {

@@ -68,7 +68,8 @@ GN_MUST_USE int gn_rt_create(struct gn_rt **out_rt, struct gn_error *out_error);
 void gn_rt_destroy(struct gn_rt **rt);
 
 /**
- * Adds a mesh to a set; vertices are transformed to world once. The mesh is copied. object is given
+ * Adds a mesh to a set; vertices are transformed to world once. The mesh is copied; one with
+ * cut-outs is also borrowed until gn_rt_destroy: rays pass where it is cut out. object is given
  * back in hits. Returns 0, -EINVAL (singular or non-finite matrix, already committed), -ENOMEM.
  */
 GN_MUST_USE int gn_rt_add_mesh(struct gn_rt *rt, enum gn_rt_set set, uint32_t object,

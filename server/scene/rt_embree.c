@@ -199,6 +199,33 @@ void gn_rt_widen_bounds(struct rt_bounds *bounds, const struct rt_bounds *more)
     }
 }
 
+/** Lets rays pass where the mesh is cut out: those lanes' hits are dropped. */
+static void filter_cutouts(const struct RTCFilterFunctionNArguments *arguments)
+{
+    // In C the hits' rows of N have no names: Ng_x, Ng_y, Ng_z, u, v, primID, ... (rtcore_ray.h).
+    const struct gn_mesh *mesh = arguments->geometryUserPtr;
+    const char *rows = (const char *)arguments->hit;
+    size_t n = arguments->N;
+    for (size_t i = 0; i < n; i++) {
+        float uv[2];
+        uint32_t triangle;
+        memcpy(&uv[0], rows + 4 * (3 * n + i), sizeof(uv[0]));
+        memcpy(&uv[1], rows + 4 * (4 * n + i), sizeof(uv[1]));
+        memcpy(&triangle, rows + 4 * (5 * n + i), sizeof(triangle));
+        if (arguments->valid[i] != 0 && gn_mesh_is_cut_out(mesh, triangle, uv[0], uv[1]))
+            arguments->valid[i] = 0;
+    }
+}
+
+static void set_cutouts(RTCGeometry geometry, const struct gn_mesh *mesh)
+{
+    void *pointer; // Embree hands it back as it is; nothing is written through it
+    memcpy(&pointer, &mesh, sizeof(pointer));
+    rtcSetGeometryUserData(geometry, pointer);
+    rtcSetGeometryIntersectFilterFunction(geometry, filter_cutouts);
+    rtcSetGeometryOccludedFilterFunction(geometry, filter_cutouts);
+}
+
 static int check_addition(const struct gn_rt *rt, enum gn_rt_set set, const double m[static 16],
                           struct gn_error *out_error)
 {
@@ -240,6 +267,8 @@ static int make_geometry(struct gn_rt *rt, uint32_t object, const struct gn_mesh
         triangles[i] = mesh->triangles[i];
     }
     rtcSetGeometryMask(geometry, 0xffffffffu);
+    if (gn_mesh_has_cutouts(mesh))
+        set_cutouts(geometry, mesh);
     rtcCommitGeometry(geometry);
     *out_geometry = geometry;
     geometry = NULL;

@@ -45,36 +45,43 @@ static const uint8_t *get_texel(const struct gn_texture *texture, int level, int
     return texture->levels[level] + 4 * ((size_t)y * (size_t)width + (size_t)x);
 }
 
-/** The range of texels of a side that a texel of the half side covers: 1 to 3, so that odd sides
- * lose none. */
-static void get_cover(int i, int side, int half, int *out_first, int *out_last)
+/** Share of texel j of a side that texel i of the half side covers, so that odd sides lose and
+ * count none twice; [0, 1]. */
+static double get_share(int j, int i, int side, int half)
 {
-    *out_first = i * side / half;
-    *out_last = ((i + 1) * side - 1) / half;
+    double first = (double)i * side / half;
+    double last = (double)(i + 1) * side / half;
+    return fmin(j + 1, last) - fmax(j, first);
 }
 
-/** The next level: means of linear values. */
+/** A texel of the next level: the mean of linear values. */
+static void average(struct gn_texture *texture, int level, int width, int height, int x, int y,
+                    uint8_t out[static 4])
+{
+    int w = half_side(width);
+    int h = half_side(height);
+    double sum[5] = {0};
+    for (int j = (int)((long)y * height / h); j < height && get_share(j, y, height, h) > 0; j++) {
+        for (int i = (int)((long)x * width / w); i < width && get_share(i, x, width, w) > 0; i++) {
+            const uint8_t *texel = get_texel(texture, level, width, i, j);
+            double share = get_share(j, y, height, h) * get_share(i, x, width, w);
+            for (int k = 0; k < 4; k++)
+                sum[k] += share * (double)decode(texture, k, texel[k]);
+            sum[4] += share;
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        out[k] = encode(texture, k, (float)(sum[k] / sum[4]));
+}
+
 static void halve(struct gn_texture *texture, int level, int width, int height)
 {
     int w = half_side(width);
     int h = half_side(height);
     for (int y = 0; y < h; y++) {
-        for (int x = 0; x < w; x++) {
-            int x0, x1, y0, y1;
-            double sum[4] = {0};
-            get_cover(x, width, w, &x0, &x1);
-            get_cover(y, height, h, &y0, &y1);
-            for (int j = y0; j <= y1; j++) {
-                for (int i = x0; i <= x1; i++) {
-                    const uint8_t *texel = get_texel(texture, level, width, i, j);
-                    for (int k = 0; k < 4; k++)
-                        sum[k] += (double)decode(texture, k, texel[k]);
-                }
-            }
-            uint8_t *out = texture->levels[level + 1] + 4 * ((size_t)y * (size_t)w + (size_t)x);
-            for (int k = 0; k < 4; k++)
-                out[k] = encode(texture, k, (float)(sum[k] / ((x1 - x0 + 1) * (y1 - y0 + 1))));
-        }
+        for (int x = 0; x < w; x++)
+            average(texture, level, width, height, x, y,
+                    texture->levels[level + 1] + 4 * ((size_t)y * (size_t)w + (size_t)x));
     }
 }
 

@@ -3,6 +3,7 @@
 #include "tests/rig/room.h"
 
 #include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "tests/rig/vec.h"
@@ -41,7 +42,10 @@ int gn_rig_room_commit(struct gn_rig_room *room, struct gn_pool *pool, struct gn
 {
     int result = gn_rt_create(&room->rt, out_error);
     for (int i = 0; result == 0 && i < room->n_objects; i++) {
-        const struct gn_rig_object *o = &room->objects[i];
+        struct gn_rig_object *o = &room->objects[i];
+        if (o->finish == GN_RIG_GGX && !o->gloss &&
+            !(o->gloss = gn_rig_gloss_create(o->roughness, o->metallic, o->ior)))
+            return gn_error_set(out_error, -ENOMEM, "rig: no memory for a finish");
         result = gn_rt_add_mesh(room->rt, o->role, (uint32_t)i, &o->mesh, o->world_from_object,
                                 out_error);
         if (result == 0 && add_emitters(&room->emitters, o) != 0)
@@ -52,8 +56,10 @@ int gn_rig_room_commit(struct gn_rig_room *room, struct gn_pool *pool, struct gn
 
 void gn_rig_room_finish(struct gn_rig_room *room)
 {
-    for (int i = 0; i < room->n_objects; i++)
+    for (int i = 0; i < room->n_objects; i++) {
         gn_mesh_finish(&room->objects[i].mesh);
+        free(room->objects[i].gloss);
+    }
     gn_rt_destroy(&room->rt);
     gn_rig_emitters_finish(&room->emitters);
     memset(room, 0, sizeof(*room));
@@ -84,12 +90,45 @@ static void get_shading_normal(const struct gn_rig_object *object, const struct 
     vec_normalize(out_normal);
 }
 
+/* How far the point lies under each corner's tangent plane, taken back along that corner's normal,
+ * weighed as the point weighs the corners (Hanika, Ray Tracing Gems II, 2021, chapter 4). */
+static void get_lift(const struct gn_rig_object *object, const struct gn_rt_hit *hit, double side,
+                     double out_lift[static 3])
+{
+    const double *m = object->world_from_object;
+    const double share[3] = {1.0 - hit->u - hit->v, hit->u, hit->v};
+    double corner[3][3], normal[3][3], point[3] = {0};
+    for (int i = 0; i < 3; i++) {
+        size_t v = 3 * (size_t)object->mesh.triangles[3 * (size_t)hit->triangle + (size_t)i];
+        for (int k = 0; k < 3; k++) {
+            corner[i][k] = normal[i][k] = 0;
+            for (int j = 0; j < 3; j++) {
+                corner[i][k] += m[4 * k + j] * object->mesh.positions[v + (size_t)j];
+                normal[i][k] += side * m[4 * k + j] * object->mesh.normals[v + (size_t)j];
+            }
+            point[k] += share[i] * corner[i][k];
+        }
+        vec_normalize(normal[i]);
+    }
+    for (int i = 0; i < 3; i++) {
+        double under = 0;
+        for (int k = 0; k < 3; k++)
+            under += (corner[i][k] - point[k]) * normal[i][k];
+        for (int k = 0; k < 3 && under > 0; k++)
+            out_lift[k] += share[i] * under * normal[i][k];
+    }
+}
+
 void gn_rig_room_get_surface(const struct gn_rig_room *room, const double dir[static 3],
                              const struct gn_rt_hit *hit, struct gn_rig_surface *out_surface)
 {
     const struct gn_rig_object *object = &room->objects[hit->object];
     struct gn_rig_surface s = {.clearance = hit->clearance,
                                .is_mirror = object->finish == GN_RIG_MIRROR,
+                               .is_glass = object->finish == GN_RIG_GLASS,
+                               .is_front = true,
+                               .ior = object->ior,
+                               .gloss = object->gloss,
                                .is_virtual = object->role == GN_RT_VIRTUAL};
     for (int k = 0; k < 3; k++) {
         s.point[k] = hit->point[k];
@@ -99,15 +138,17 @@ void gn_rig_room_get_surface(const struct gn_rig_room *room, const double dir[st
                           : object->albedo[k];
     }
     gn_rig_finish_get_albedo(object->finish, s.point, s.albedo);
-    if (vec_dot(s.normal_geometric, dir) > 0)
+    s.is_front = vec_dot(s.normal_geometric, dir) <= 0;
+    if (!s.is_front)
         vec_scale(s.normal_geometric, -1, s.normal_geometric);
     else
         memcpy(s.emission, object->emission, sizeof(s.emission));
     memcpy(s.normal_shading, s.normal_geometric, sizeof(s.normal_shading));
     if (object->mesh.normals) {
         get_shading_normal(object, hit, s.normal_shading);
-        if (vec_dot(s.normal_shading, s.normal_geometric) < 0)
-            vec_scale(s.normal_shading, -1, s.normal_shading);
+        double side = vec_dot(s.normal_shading, s.normal_geometric) < 0 ? -1 : 1;
+        vec_scale(s.normal_shading, side, s.normal_shading);
+        get_lift(object, hit, side, s.lift);
     }
     *out_surface = s;
 }

@@ -14,6 +14,7 @@
 #include "server/scene/mesh.h"
 #include "server/scene/rt.h"
 #include "tests/rig/emitters.h"
+#include "tests/rig/gloss.h"
 
 #define GN_RIG_MAX_OBJECTS 16
 /** Triangles of the demo room, teapot included. */
@@ -26,6 +27,8 @@ enum gn_rig_finish {
     GN_RIG_MIRROR, // albedo: reflectance
     GN_RIG_WOOD,   // diffuse, planks over x and y; albedo: their mean
     GN_RIG_MARKER, // diffuse, the marker printed on paper; albedo: its mean
+    GN_RIG_GGX,    // gloss.h; albedo: the base colour
+    GN_RIG_GLASS,  // a closed mesh of smooth glass; albedo: what a passage of its surface leaves
 };
 
 /** One object. Its matrix may turn, move and scale all axes alike, nothing else. */
@@ -33,9 +36,11 @@ struct gn_rig_object {
     const char *name; // static
     enum gn_rt_set role;
     enum gn_rig_finish finish;
-    double albedo[3];    // unless the mesh has albedos
-    double emission[3];  // W/(sr m^2), sent from its outside; diffuse objects only
-    struct gn_mesh mesh; // owned
+    double albedo[3];                // unless the mesh has albedos
+    double emission[3];              // W/(sr m^2), sent from its outside; diffuse objects only
+    double roughness, metallic, ior; // of ggx and, the ior, of glass
+    struct gn_rig_gloss *gloss;      // of ggx, from commit on; owned
+    struct gn_mesh mesh;             // owned
     double world_from_object[16];
 };
 
@@ -54,10 +59,16 @@ struct gn_rig_surface {
     double point[3];
     double clearance;           // m, the hit's
     double normal_geometric[3]; // turned to where the ray came from
-    double normal_shading[3];   // interpolated, turned to the same side
+    double normal_shading[3];   // interpolated, turned to the same side; light comes from above it
+    double lift[3];             // m, from the point to the smooth surface the normals tell of
     double albedo[3];
-    double emission[3]; // to where the ray came from
+    double own_albedo[3]; // the tracer's: of ggx, before albedo became the diffuse base's
+    double emission[3];   // to where the ray came from
     bool is_mirror;
+    bool is_glass;
+    bool is_front;                    // seen from outside
+    double ior;                       // of glass
+    const struct gn_rig_gloss *gloss; // of ggx; borrowed, else NULL
     bool is_virtual;
 };
 

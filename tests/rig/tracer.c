@@ -9,13 +9,15 @@
 #include "tests/rig/random.h"
 #include "tests/rig/vec.h"
 
-/* Bounces and mirrors together. */
-#define MAX_VERTICES (GN_RIG_MAX_BOUNCES + 4)
+/* Bounces, mirrors and glass together. */
+#define MAX_VERTICES (GN_RIG_MAX_BOUNCES + 24)
 /* Pairs of random numbers: one for the pixel, two for each vertex; then, where there is near light,
- * one for the emitters and one for each lamp at each vertex; then one for the lens's blur. */
+ * one for the emitters and one for each lamp at each vertex; then one for the lens's blur; then one
+ * for the choice of a way at each vertex. */
 #define NEAR_PAIRS (1 + 2 * MAX_VERTICES)
 #define BLUR_PAIR (NEAR_PAIRS + (1 + GN_RIG_MAX_LAMPS) * MAX_VERTICES)
-#define MAX_PAIRS (BLUR_PAIR + 1)
+#define CHOICE_PAIRS (BLUR_PAIR + 1)
+#define MAX_PAIRS (CHOICE_PAIRS + MAX_VERTICES)
 
 /* Rays to near light end this share of their length before it: they start a little off the surface,
  * so that they would run into an emitter seen edge-on. */
@@ -71,7 +73,10 @@ static void leave_surface(const struct gn_rig_surface *s, const double dir[stati
     to_float(s->point, point);
     to_float(s->normal_geometric, normal);
     to_float(dir, out_dir);
-    gn_rt_offset_origin(point, normal, (float)s->clearance, out_dir, out_org);
+    gn_rt_offset_origin(point, normal, (float)s->clearance,
+                        vec_dot(s->normal_shading, dir) > 0 ? normal : out_dir, out_org);
+    for (int k = 0; k < 3 && vec_dot(s->normal_shading, dir) > 0; k++)
+        out_org[k] += (float)s->lift[k];
 }
 
 /* Bright light from one sampled direction that the surface sends on, for an albedo of 1. */
@@ -84,7 +89,7 @@ static void gather_light(const struct job *job, enum gn_rt_set set, const struct
     if (!gn_rig_environment_sample(job->env, s->point, uv, &light))
         return;
     double cosine = vec_dot(light.dir, s->normal_shading);
-    if (cosine <= 0 || vec_dot(light.dir, s->normal_geometric) <= 0)
+    if (cosine <= 0)
         return;
     leave_surface(s, light.dir, org, dir);
     if (gn_rt_is_occluded(job->room->rt, set, org, dir, 0, (float)light.distance)) {
@@ -105,7 +110,7 @@ static void add_near(const struct job *job, enum gn_rt_set set, const struct gn_
 {
     float org[3], dir[3];
     double cosine = vec_dot(light->dir, s->normal_shading);
-    if (cosine <= 0 || vec_dot(light->dir, s->normal_geometric) <= 0)
+    if (cosine <= 0)
         return;
     leave_surface(s, light->dir, org, dir);
     float length = (float)(light->distance * (1 - NEAR_GAP));
@@ -151,11 +156,45 @@ static void sample_cosine(const double n[static 3], const double uv[static 2],
     vec_normalize(out_dir);
 }
 
-/* The next direction; false ends the path. The weight is multiplied by what the surface sends on.
- */
-static bool leave(const struct gn_rig_surface *s, const double uv[static 2],
-                  double io_dir[static 3], double io_weight[static 3])
+/* A normal that looks away from the ray is turned until it just does not. */
+static void get_facing(const struct gn_rig_surface *s, const double dir[static 3],
+                       double out[static 3])
 {
+    double missing = 1e-4 + vec_dot(s->normal_shading, dir);
+    for (int k = 0; k < 3; k++)
+        out[k] = s->normal_shading[k] - (missing > 0 ? missing * dir[k] : 0);
+    vec_normalize(out);
+}
+
+static bool leave_glass(const struct gn_rig_surface *s, double choice, double io_dir[static 3],
+                        double io_weight[static 3])
+{
+    double normal[3];
+    get_facing(s, io_dir, normal);
+    bool through = gn_rig_glass_choose(normal, s->is_front ? s->ior : 1 / s->ior, choice, io_dir);
+    for (int k = 0; k < 3 && through; k++)
+        io_weight[k] *= s->albedo[k];
+    return (vec_dot(io_dir, s->normal_shading) < 0) == through;
+}
+
+/* The next direction; false ends the path. The weight is multiplied by what the surface sends on.
+ * *io_base: the surface is diffuse, or is left as if it were; of ggx, one of both by chance. */
+static bool leave(const struct gn_rig_surface *s, const double uv[static 2], double choice,
+                  double io_dir[static 3], double io_weight[static 3], bool *io_base)
+{
+    double normal[3];
+    if (s->is_glass)
+        return leave_glass(s, choice, io_dir, io_weight);
+    if (s->gloss && (!*io_base || choice < 0.5)) {
+        for (int k = 0; k < 3 && *io_base; k++)
+            io_weight[k] *= 2;
+        *io_base = false;
+        get_facing(s, io_dir, normal);
+        return gn_rig_gloss_reflect(s->gloss, s->own_albedo, normal, uv, io_dir, io_weight) &&
+               vec_dot(io_dir, s->normal_shading) > 0;
+    }
+    for (int k = 0; k < 3 && s->gloss; k++)
+        io_weight[k] *= 2;
     for (int k = 0; k < 3; k++)
         io_weight[k] *= s->albedo[k];
     if (s->is_mirror) {
@@ -165,7 +204,7 @@ static bool leave(const struct gn_rig_surface *s, const double uv[static 2],
     } else {
         sample_cosine(s->normal_shading, uv, io_dir);
     }
-    return vec_dot(io_dir, s->normal_geometric) > 0;
+    return vec_dot(io_dir, s->normal_shading) > 0;
 }
 
 /* The nearest surface that lies before the light. */
@@ -181,6 +220,18 @@ static bool find_surface(const struct job *job, enum gn_rt_set set, const double
         return false;
     gn_rig_room_get_surface(job->room, dir, &hit, out_surface);
     return true;
+}
+
+/* Whether the surface reflects diffusely too; its albedo becomes that part's. */
+static bool get_base(struct gn_rig_surface *s, const double dir[static 3])
+{
+    double normal[3];
+    memcpy(s->own_albedo, s->albedo, sizeof(s->albedo));
+    if (s->gloss) {
+        get_facing(s, dir, normal);
+        gn_rig_gloss_get_base(s->gloss, s->own_albedo, -vec_dot(normal, dir), s->albedo);
+    }
+    return !s->is_mirror && !s->is_glass && s->albedo[0] + s->albedo[1] + s->albedo[2] > 0;
 }
 
 /* The light that the path ran into; behind a diffuse point, bright light was gathered already. */
@@ -201,7 +252,7 @@ static void trace_path(const struct job *job, enum gn_rt_set set, struct draws *
                        struct path *out_path)
 {
     struct path path = {0};
-    double weight[3] = {1, 1, 1}, from[3], dir[3], rgb[3], uv[2];
+    double weight[3] = {1, 1, 1}, from[3], dir[3], rgb[3], uv[2], choice[2] = {0};
     float org[3];
     bool is_gathered = false; // the surface that the ray leaves has gathered bright light
     int diffuse = 0;          // surfaces met so far
@@ -220,9 +271,10 @@ static void trace_path(const struct job *job, enum gn_rt_set set, struct draws *
             path.all[k] += weight[k] * s.emission[k];
             path.direct[k] += diffuse == 0 ? weight[k] * s.emission[k] : 0;
         }
-        if (diffuse > job->options.bounces)
+        if (diffuse > job->options.bounces && is_gathered)
             break; // the last ray only looked for light
-        if (!s.is_mirror) {
+        bool has_base = get_base(&s, dir);
+        if (has_base) {
             get_pair(draws, 1 + 2 * vertex, uv);
             gather_light(job, set, &s, uv, rgb, &path.meets_virtual);
             gather_near(job, set, &s, draws, vertex, rgb, &path.meets_virtual);
@@ -231,12 +283,14 @@ static void trace_path(const struct job *job, enum gn_rt_set set, struct draws *
                 path.all[k] += sent;
                 path.direct[k] += diffuse == 0 ? sent : 0;
             }
-            diffuse++;
         }
-        is_gathered = !s.is_mirror;
         get_pair(draws, 2 + 2 * vertex, uv);
-        if (!leave(&s, uv, dir, weight))
+        if (s.gloss || s.is_glass)
+            get_pair(draws, CHOICE_PAIRS + vertex, choice);
+        if (!leave(&s, uv, choice[0], dir, weight, &has_base))
             break;
+        is_gathered = has_base;
+        diffuse += has_base;
         float dirf[3];
         leave_surface(&s, dir, org, dirf);
         memcpy(from, s.point, sizeof(from));

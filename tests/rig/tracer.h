@@ -5,12 +5,13 @@
  * really in it, with direct light alone and with bounces. Written apart from server/render: the two
  * judge each other.
  *
- * A diffuse point sends  albedo / pi * sum over lights L max(0, n_shading . w) V / pdf  where V is
- * 0 also below the geometric horizon. Bright light is sampled by importance (environment.h); the
- * dim rest is what the path runs into when it leaves in proportion to the cosine. A mirror
- * continues the path and is not a bounce. Of near light (emitters.h) each diffuse point takes one
- * chosen point; so a path that runs into an emitter takes its light only where no diffuse point
- * came before: seen by the camera or in a mirror.
+ * A diffuse point sends  albedo / pi * sum over lights L max(0, n_shading . w) V / pdf; V is tried
+ * from the smooth surface that the vertex normals tell of. Bright light is sampled by importance
+ * (environment.h); the dim rest is what the path runs into when it leaves in proportion to the
+ * cosine. A mirror, glass and the reflection of a ggx surface (gloss.h) continue the path and are
+ * no bounce. Of near light (emitters.h) each diffuse point takes one chosen point; so a path that
+ * runs into an emitter takes its light only where no diffuse point came before: seen by the camera
+ * or in a mirror.
  */
 #ifndef GN_TESTS_RIG_TRACER_H
 #define GN_TESTS_RIG_TRACER_H

@@ -17,6 +17,9 @@
  *           against the rig's truth, where that differs from the background by more than 1/255 of
  *           it. Silhouettes are left out: there a composite multiplies what the teapot hides, too.
  *
+ * In the glossy scenarios the teapot is of ggx or glass. Both renderers mean the same surfaces but
+ * have other formulas for them (tests/rig/gloss.h), and other ways to find their light.
+ *
  * The near room is black around, lit by what stands in it: a lamp and a screen of the room, a
  * virtual lamp and a virtual screen. The server has each piece's irradiance exactly and one ray for
  * its visibility, the rig points chosen evenly over the emitters and nothing else. Silhouettes
@@ -69,6 +72,8 @@ struct scenario {
     bool is_whole; // all objects are virtual
     bool is_near;  // the near room instead of the demo room
     double bound;  // > 0: quality interactive, off by no more than this share of the truth's mean
+    enum gn_rig_finish finish; // of the teapot; ggx's or glass's numbers:
+    double roughness, metallic;
 };
 
 /* Differences, reference less rig, and what they are differences of. */
@@ -146,6 +151,7 @@ static void init_light(const struct scenario *scenario, const struct gn_scene *s
     assert_int_equal(gn_projection_init(&frame.projection, NULL), 0);
     assert_int_equal(gn_radiance_map_create(&frame, NULL, NULL, &light->map, NULL), 0);
     light->state.map = light->map;
+    assert_int_equal(gn_pyramid_create(light->map, &light->state.pyramid), 0);
     assert_int_equal(gn_rig_environment_init(&texels, 0, &light->env, NULL), 0);
     if (scenario->is_near) {
         assert_int_equal(gn_emitters_create(scene, NULL, &light->emitters, NULL), 0);
@@ -163,6 +169,7 @@ static void finish_light(struct light *light)
     gn_rig_environment_finish(&light->env);
     gn_lighting_state_unref(&light->near);
     gn_emitters_destroy(&light->emitters);
+    gn_pyramid_unref(&light->state.pyramid);
     gn_radiance_map_unref(&light->map);
 }
 
@@ -181,12 +188,30 @@ static void init_demo_room(bool is_white, struct gn_rig_room *room)
     }
 }
 
+/* Makes the teapot glossy. */
+static void polish(const struct scenario *scenario, struct gn_rig_room *room)
+{
+    for (int i = 0; i < room->n_objects; i++) {
+        struct gn_rig_object *o = &room->objects[i];
+        if (strcmp(o->name, "teapot") != 0)
+            continue;
+        o->finish = scenario->finish;
+        o->roughness = scenario->roughness;
+        o->metallic = scenario->metallic;
+        o->ior = 1.5;
+        return;
+    }
+    fail_msg("no teapot");
+}
+
 static void init_room(const struct scenario *scenario, struct gn_rig_room *room)
 {
     if (scenario->is_near)
         gn_near_room_init(room);
     else
         init_demo_room(scenario->bounces > 0, room);
+    if (scenario->finish != GN_RIG_DIFFUSE)
+        polish(scenario, room);
 }
 
 /* The same room as a server's scene. */
@@ -203,6 +228,12 @@ static struct gn_scene *make_scene(const struct scenario *scenario)
                                               .role = scenario->is_whole ? GN_RT_VIRTUAL : o->role,
                                               .has_material = !o->mesh.albedos,
                                               .mesh = o->mesh};
+        if (o->finish == GN_RIG_GGX || o->finish == GN_RIG_GLASS)
+            objects[i].material = (struct gn_material){
+                .type = o->finish == GN_RIG_GGX ? GN_MATERIAL_GGX : GN_MATERIAL_GLASS,
+                .roughness = (float)o->roughness,
+                .metallic = (float)o->metallic,
+                .ior = (float)o->ior};
         for (int k = 0; k < 3; k++) {
             objects[i].material.albedo[k] = (float)o->albedo[k];
             objects[i].emission[k] = (float)o->emission[k];
@@ -356,7 +387,11 @@ static void run(const struct scenario *scenario, const char *name)
     assert_int_equal(gn_layers_init(&layers, WIDTH, HEIGHT), 0);
     for (int pair = 0; pair < PAIRS; pair++) {
         struct gn_rig_render_options rig_options = {
-            .bounces = scenario->bounces, .batches = 2, .batch_size = 256, .frame = pair};
+            .bounces = scenario->bounces,
+            .batches = 2,
+            // Its glossy paths meet the lamps by chance alone.
+            .batch_size = scenario->finish != GN_RIG_DIFFUSE ? 1024 : 256,
+            .frame = pair};
         struct gn_render_options options = {.quality = scenario->bound > 0 ? GN_QUALITY_INTERACTIVE
                                                                            : GN_QUALITY_REFERENCE,
                                             .supersample_all = true,
@@ -468,9 +503,51 @@ static void test_near_layers_interactive(void **state)
     run(&s, "near, layers, interactive");
 }
 
+static void test_glossy_metal(void **state)
+{
+    const struct scenario s = {.paint = paint_both,
+                               .map_height = 64,
+                               .n_paths = 512,
+                               .is_whole = true,
+                               .finish = GN_RIG_GGX,
+                               .roughness = 0.5,
+                               .metallic = 1};
+    (void)state;
+    run(&s, "glossy, metal");
+}
+
+static void test_glossy_lacquer(void **state)
+{
+    const struct scenario s = {.paint = paint_sky,
+                               .map_height = 56,
+                               .bounces = 1,
+                               .n_paths = 512,
+                               .is_whole = true,
+                               .finish = GN_RIG_GGX,
+                               .roughness = 0.3,
+                               .metallic = 0.25};
+    (void)state;
+    run(&s, "glossy, lacquer, 1 bounce");
+}
+
+static void test_glass(void **state)
+{
+    const struct scenario s = {.paint = paint_sky,
+                               .map_height = 56,
+                               .bounces = 1,
+                               .n_paths = 512,
+                               .is_whole = true,
+                               .finish = GN_RIG_GLASS};
+    (void)state;
+    run(&s, "glass, 1 bounce");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_glossy_metal),
+        cmocka_unit_test(test_glossy_lacquer),
+        cmocka_unit_test(test_glass),
         cmocka_unit_test(test_whole_sky),
         cmocka_unit_test(test_whole_lamps),
         cmocka_unit_test(test_whole_bounces),

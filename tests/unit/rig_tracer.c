@@ -109,7 +109,7 @@ static void test_furnace(void **state)
     double direct = get_mean(&p.mean[GN_RIG_TRUTH], &p.error[GN_RIG_TRUTH], &direct_error);
     print_message("# furnace: %.5f +- %.5f of 1 with 8 bounces, %.3f with none\n", all, error,
                   direct);
-    assert_true(all < 1 + 3 * error && all > 0.998);
+    assert_true(all < 1 + 3 * error + 1e-6 && all > 0.998); // pictures are floats
     assert_true(direct < 0.95);
     gn_rig_pictures_finish(&p);
     gn_rig_environment_finish(&env);
