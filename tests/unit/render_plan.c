@@ -230,7 +230,8 @@ static void test_every_reason(void **state)
     assert_left_out(&stage, "shadow", "the scene has no virtual object");
     assert_left_out(&stage, "refine", "no edge in view");
     assert_left_out(&stage, "added",
-                    "0 bounces: nothing is added; caustics of mirrors are not built");
+                    "0 bounces: nothing is added; light by way of mirrors and glass is "
+                    "not followed");
     assert_int_equal(stage.report.rays_shade + stage.report.rays_shadow, 0);
     gn_test_stage_finish(&stage);
 
