@@ -157,8 +157,7 @@ static bool weigh(const struct search *s, struct gn_compact_light *out_light)
     for (int c = 0; c < 3; c++)
         light.dir_world[c] = above.toward[c] / length;
     light.angular_radius = (double)disc.angular_radius;
-    light.energy =
-        0.2126 * light.irradiance[0] + 0.7152 * light.irradiance[1] + 0.0722 * light.irradiance[2];
+    light.energy = gn_luminance_of_sum(light.irradiance);
     light.solid_angle = whole.solid_angle;
     *out_light = light;
     return true;
@@ -283,8 +282,7 @@ static int sum_anew(struct gn_radiance_map *map, struct gn_pool *pool)
             sum[c] += r.rows[y].irradiance[c];
     }
     f->max_luminance = max;
-    f->mean_luminance =
-        (0.2126 * sum[0] + 0.7152 * sum[1] + 0.0722 * sum[2]) / f->shown_solid_angle;
+    f->mean_luminance = gn_luminance_of_sum(sum) / f->shown_solid_angle;
     memcpy(f->shown_irradiance, sum, sizeof(sum));
     free(r.rows);
     return 0;

@@ -274,7 +274,7 @@ static void add_texels(const struct gn_radiance_map *map, size_t first, size_t n
 static void finish_cell(struct gn_grid_cell *cell)
 {
     const double *e = cell->irradiance;
-    cell->energy = GN_LUMINANCE_R * e[0] + GN_LUMINANCE_G * e[1] + GN_LUMINANCE_B * e[2];
+    cell->energy = gn_luminance_of_sum(e);
     cell->own_spread /= 4 * pi;
 }
 

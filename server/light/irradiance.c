@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "server/light/luminance.h"
+
 static const double pi = 3.14159265358979323846;
 
 /* Directions that are looked at first, and lowest points that are added to them. */
@@ -58,8 +60,7 @@ static void init_ringing(struct ringing *r, int order, const double sh[][3])
     r->n = N_SPREAD;
     for (int l = 0; l <= order; l++)
         for (int k = l * l; k < (l + 1) * (l + 1); k++)
-            r->sh[k] = gn_sh_get_cosine_factor(l) *
-                       (0.2126 * sh[k][0] + 0.7152 * sh[k][1] + 0.0722 * sh[k][2]);
+            r->sh[k] = gn_sh_get_cosine_factor(l) * gn_luminance_of_sum(sh[k]);
     for (int i = 0; i < N_SPREAD; i++) { // Fibonacci's spiral
         double z = 1 - 2 * (i + 0.5) / N_SPREAD, s = sqrt(1 - z * z), phi = i * pi * (3 - sqrt(5));
         fill_sample(r, (double[3]){s * cos(phi), s * sin(phi), z}, &r->samples[i]);

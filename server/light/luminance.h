@@ -16,4 +16,10 @@ static inline double gn_luminance(const float rgb[static 3])
            GN_LUMINANCE_B * (double)rgb[2];
 }
 
+/** Y of sums, which are kept in double. */
+static inline double gn_luminance_of_sum(const double rgb[static 3])
+{
+    return GN_LUMINANCE_R * rgb[0] + GN_LUMINANCE_G * rgb[1] + GN_LUMINANCE_B * rgb[2];
+}
+
 #endif

@@ -172,8 +172,7 @@ static void sum_row(const struct gn_map_reader *r, int y, struct gn_map_row *row
             sum_alike(l + 3 * x, n, sum);
         else
             sum_weighted(l + 3 * x, weight + x, n, sum);
-        row->luminance[patch] =
-            GN_LUMINANCE_R * sum[0] + GN_LUMINANCE_G * sum[1] + GN_LUMINANCE_B * sum[2];
+        row->luminance[patch] = gn_luminance_of_sum(sum);
         for (int c = 0; c < 3; c++)
             row->irradiance[c] += sum[c];
         x += n;

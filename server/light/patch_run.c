@@ -8,6 +8,7 @@
 
 #include <math.h>
 
+#include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
 #include "server/light/vec4.h"
 
@@ -98,7 +99,7 @@ static void add_to_patch(const struct gn_run_total *s, double unit, struct gn_pa
         patch->irradiance[c] += e[c];
         patch->toward[c] += unit * s->toward[c];
     }
-    patch->energy += GN_LUMINANCE_R * e[0] + GN_LUMINANCE_G * e[1] + GN_LUMINANCE_B * e[2];
+    patch->energy += gn_luminance_of_sum(e);
     patch->own_spread += unit * s->own_spread / (4 * pi);
     patch->n_lit += (int)s->n_lit;
 }

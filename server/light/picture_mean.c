@@ -32,11 +32,6 @@ struct row {
     int width;
 };
 
-static double get_luminance(const double rgb[static 3])
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; // as gn_luminance
-}
-
 static int compare_rows(const void *a, const void *b)
 {
     const struct outline *oa = a, *ob = b;
@@ -100,7 +95,7 @@ static void add_step(struct outline *o, const struct row *row, int pixel, double
     }
     o->sums[AREA] += dy * xm;
     // Simpson's rule is exact for these: quadratic along the step. x counts from the first column.
-    double base = get_luminance(before);
+    double base = gn_luminance_of_sum(before);
     double moment_base = row->moment[column] - row->moment[o->column] - o->column * base;
     double mx[3];
     for (int i = 0; i < 3; i++) {
@@ -168,7 +163,7 @@ static void finish_mean(const struct gn_image *image, const struct outline *o,
     } else {
         for (int c = 0; c < 3; c++)
             out->rgb[c] = fmax(o->sums[RED + c] / area, 0);
-        double luminance = get_luminance(out->rgb) * area;
+        double luminance = gn_luminance_of_sum(out->rgb) * area;
         if (fabs(luminance) > 0) {
             cx = o->sums[MOMENT_X] / luminance;
             cy = o->sums[MOMENT_Y] / luminance;

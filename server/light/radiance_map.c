@@ -74,7 +74,7 @@ static void sum_figures(struct gn_radiance_map *map, const struct gn_map_reader 
         }
     }
     const double *e = f.shown_irradiance;
-    double luminance = GN_LUMINANCE_R * e[0] + GN_LUMINANCE_G * e[1] + GN_LUMINANCE_B * e[2];
+    double luminance = gn_luminance_of_sum(e);
     f.mean_luminance = f.shown_solid_angle > 0 ? luminance / f.shown_solid_angle : 0;
     f.max_luminance = get_max_luminance(reader, map->rows, map->radiance.height);
     map->figures = f;

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/light/luminance.h"
 
 /* A light whose direction jumps further than this does not turn: it fades out here, in there. */
 static const double cos_jump = 0.866025403784439; // 30 degrees
@@ -24,11 +25,6 @@ static const double share_settled = 1e-7;
 static const double tau_moving = 0.04;
 static const double deviation_noise = 0.003, deviation_moving = 0.006;
 
-static double get_luminance(const double rgb[static 3])
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
 static double get_length(const double v[static 3])
 {
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -41,7 +37,7 @@ static void set_raw(struct gn_temporal_light *light, const struct gn_light *raw)
     *light = (struct gn_temporal_light){.raw = *raw};
     for (int k = 0; k < 3; k++)
         light->irradiance[k] = (double)raw->irradiance[k];
-    double luminance = get_luminance(light->irradiance);
+    double luminance = gn_luminance_of_sum(light->irradiance);
     for (int k = 0; k < 3; k++)
         light->moment[k] = luminance * mean * (double)raw->dir_world[k];
 }
@@ -50,7 +46,7 @@ static void set_raw(struct gn_temporal_light *light, const struct gn_light *raw)
 static void get_direction(const struct gn_temporal_light *light, double out_dir[static 3])
 {
     double length = get_length(light->moment);
-    bool is_known = length > 1e-9 * get_luminance(light->irradiance);
+    bool is_known = length > 1e-9 * gn_luminance_of_sum(light->irradiance);
     for (int k = 0; k < 3; k++)
         out_dir[k] = is_known ? light->moment[k] / length : (double)light->raw.dir_world[k];
 }
@@ -173,7 +169,7 @@ static void fade(struct step *s, const struct gn_temporal_light *kept, bool is_n
     get_direction(kept, dir);
     s->out->figures.n_deaths += is_new;
     if (is_new)
-        light.fading_from = fmax(get_luminance(kept->irradiance), DBL_MIN);
+        light.fading_from = fmax(gn_luminance_of_sum(kept->irradiance), DBL_MIN);
     scale_light(&light, 1 - s->alpha);
     if (gn_change_has(&s->change, dir))
         snap(s, &light, &gone);
@@ -200,7 +196,7 @@ static void follow(struct step *s, const struct gn_light *raw, const struct gn_t
     }
     light = end;
     if (kept) {
-        double scale = get_luminance(end.irradiance);
+        double scale = gn_luminance_of_sum(end.irradiance);
         memcpy(light.irradiance, kept->irradiance, sizeof(light.irradiance));
         memcpy(light.moment, kept->moment, sizeof(light.moment));
         for (int k = 0; k < 3; k++) {
@@ -224,7 +220,7 @@ static void bequeath(struct gn_temporal *t, const struct gn_temporal_light *gone
     get_direction(gone, dir);
     for (int i = 0; i < t->n_lights; i++) {
         struct gn_temporal_light *light = &t->lights[i];
-        if (light->fading_from != 0 || !(get_luminance(light->irradiance) > 0))
+        if (light->fading_from != 0 || !(gn_luminance_of_sum(light->irradiance) > 0))
             continue;
         get_direction(light, other);
         double c = dir[0] * other[0] + dir[1] * other[1] + dir[2] * other[2];
@@ -235,7 +231,8 @@ static void bequeath(struct gn_temporal *t, const struct gn_temporal_light *gone
     }
     // The power, not the place: nothing that stays is moved by what goes.
     double factor =
-        heir ? 1 + get_luminance(gone->irradiance) / get_luminance(heir->irradiance) : 0;
+        heir ? 1 + gn_luminance_of_sum(gone->irradiance) / gn_luminance_of_sum(heir->irradiance)
+             : 0;
     for (int k = 0; k < 3; k++) {
         if (heir) {
             heir->irradiance[k] += gone->irradiance[k];
@@ -249,7 +246,7 @@ static void bequeath(struct gn_temporal *t, const struct gn_temporal_light *gone
 static int compare_lights(const void *a, const void *b)
 {
     const struct gn_temporal_light *x = a, *y = b;
-    double lx = get_luminance(x->irradiance), ly = get_luminance(y->irradiance);
+    double lx = gn_luminance_of_sum(x->irradiance), ly = gn_luminance_of_sum(y->irradiance);
     if (lx != ly)
         return lx > ly ? -1 : 1;
     if ((x->fading_from > 0) != (y->fading_from > 0))
@@ -265,13 +262,13 @@ static void prune(struct gn_temporal *t)
     int bound = GN_LIGHTS_MAX - n_staying;
     if (n_staying > 0 && n_staying < bound)
         bound = n_staying;
-    double floor = share_gone * get_luminance(t->total);
+    double floor = share_gone * gn_luminance_of_sum(t->total);
     for (int i = 0; i < t->n_lights; i++) {
         struct gn_temporal_light *light = &t->lights[i];
         if (light->fading_from == 0)
             continue;
         double weak = n_staying > 0 ? floor : share_black * light->fading_from;
-        if (get_luminance(light->irradiance) > weak && n_fading < bound) {
+        if (gn_luminance_of_sum(light->irradiance) > weak && n_fading < bound) {
             n_fading++;
             continue;
         }
@@ -311,10 +308,10 @@ static void add_lights(struct gn_temporal *out, const struct gn_temporal_input *
     for (int i = 0; i < input->n_lights; i++) {
         struct gn_temporal_light *light = &out->lights[i];
         set_raw(light, &input->lights[i]);
-        double luminance = get_luminance(light->irradiance);
+        double luminance = gn_luminance_of_sum(light->irradiance);
         for (int c = 0; c < 3; c++)
             light->irradiance[c] *= factor[c];
-        double ratio = luminance > 0 ? get_luminance(light->irradiance) / luminance : 1;
+        double ratio = luminance > 0 ? gn_luminance_of_sum(light->irradiance) / luminance : 1;
         for (int c = 0; c < 3; c++)
             light->moment[c] *= ratio;
     }
@@ -372,7 +369,7 @@ static void follow_lights(struct step *s)
 /* Where the lights do not say what it is. */
 static void follow_total(struct step *s)
 {
-    double scale = get_luminance(s->input->total);
+    double scale = gn_luminance_of_sum(s->input->total);
     for (int k = 0; k < 3; k++) {
         double *total = &s->out->total[k];
         *total = s->kept->total[k];
@@ -531,7 +528,7 @@ void gn_temporal_get_light(const struct gn_temporal *temporal, int i, struct gn_
     *out_light = light->raw;
     if (is_light_settled(light))
         return;
-    double dir[3], luminance = get_luminance(light->irradiance);
+    double dir[3], luminance = gn_luminance_of_sum(light->irradiance);
     get_direction(light, dir);
     for (int k = 0; k < 3; k++) {
         out_light->dir_world[k] = (float)dir[k];
