@@ -36,6 +36,15 @@ int gn_cube_map_from_direction(const double dir[static 3], double out_st[static 
     return face;
 }
 
+int gn_cube_map_cross_edge(int face, double s, double t, double out_st[static 2])
+{
+    double depth = 2 - fmax(fabs(s), fabs(t)), dir[3]; // what is beyond goes down the next face
+    for (int i = 0; i < 3; i++)
+        dir[i] = depth * axes[face][0][i] + fmin(fmax(s, -1), 1) * axes[face][1][i] +
+                 fmin(fmax(t, -1), 1) * axes[face][2][i];
+    return gn_cube_map_from_direction(dir, out_st);
+}
+
 static double get_corner(double s, double t)
 {
     return atan2(s * t, sqrt(s * s + t * t + 1));

@@ -19,6 +19,12 @@ void gn_cube_map_to_direction(int face, double s, double t, double out_dir[stati
 int gn_cube_map_from_direction(const double dir[static 3], double out_st[static 2]);
 
 /**
+ * Where a walk over the cube's surface arrives that leaves the face over one edge: out_st[2] on the
+ * face there. One of s and t is beyond [-1, 1], by at most 2, the other in it.
+ */
+int gn_cube_map_cross_edge(int face, double s, double t, double out_st[static 2]);
+
+/**
  * Solid angle in sr of the part [s0, s1] x [t0, t1] of a face: G(s1, t1) - G(s1, t0) - G(s0, t1) +
  * G(s0, t0) with G(s, t) = atan2(s t, sqrt(s^2 + t^2 + 1)), the integral of
  * (1 + s^2 + t^2)^(-3/2).

@@ -435,28 +435,49 @@ double gn_projection_get_vignetting(const struct gn_projection *projection, doub
     return 1 + s * (v[0] + s * (v[1] + s * v[2]));
 }
 
+/* From one face's pixel to the one at (x, y) of that face, which may be beyond one of its edges. */
+static bool step_on_cube(int side, int face, int x, int y, int xy[static 2])
+{
+    bool is_beside = x < 0 || x >= side, is_above = y < 0 || y >= side;
+    if (is_beside && is_above)
+        return false;
+    if (is_beside || is_above) {
+        double st[2];
+        face = gn_cube_map_cross_edge(face, (2.0 * x + 1) / side - 1, 1 - (2.0 * y + 1) / side, st);
+        x = (int)floor(0.5 * (1 + st[0]) * side);
+        y = (int)floor(0.5 * (1 - st[1]) * side);
+    }
+    xy[0] = x;
+    xy[1] = face * side + y;
+    return true;
+}
+
+/* Where i arrives that turns back at the borders of [0, n). */
+static int fold(int i, int n)
+{
+    return i < 0 ? -1 - i : i >= n ? 2 * n - 1 - i : i;
+}
+
 bool gn_projection_step(const struct gn_projection *projection, int dx, int dy, int xy[static 2])
 {
     const struct gn_projection *p = projection;
-    int x = xy[0] + dx, y = xy[1] + dy;
+    int x = xy[0] + dx, y = xy[1] + dy, width = p->width, height = p->height;
+    if (p->type == GN_PROJECTION_CUBE)
+        return step_on_cube(width, xy[1] / width, x, xy[1] % width + dy, xy);
+    bool is_beside = x < 0 || x >= width, is_above = y < 0 || y >= height;
     if (p->type == GN_PROJECTION_LATLONG) {
-        if (y < 0 || y >= p->height) { // over the pole
-            y = xy[1];
-            x += p->width / 2;
-        }
-        x = (x + p->width) % p->width;
-    } else if (p->type == GN_PROJECTION_OCTAHEDRAL) {
-        bool is_beside = x < 0 || x >= p->width, is_above = y < 0 || y >= p->height;
-        x = is_beside ? xy[0] : x;
-        y = is_above ? xy[1] : y;
-        if (is_beside) // each half of a side meets the other
-            y = p->height - 1 - y;
+        x += is_above ? width / 2 : 0; // over the pole
+        x = (x % width + width) % width;
+        y = fold(y, height);
+    } else if (p->type == GN_PROJECTION_OCTAHEDRAL) { // each half of a side meets the other
+        x = fold(x, width);
+        y = fold(y, height);
+        if (is_beside)
+            y = height - 1 - y;
         if (is_above)
-            x = p->width - 1 - x;
-    } else if (p->type == GN_PROJECTION_CUBE && (y < 0 || y / p->width != xy[1] / p->width)) {
-        return false;
+            x = width - 1 - x;
     }
-    if (x < 0 || x >= p->width || y < 0 || y >= p->height)
+    if (x < 0 || x >= width || y < 0 || y >= height)
         return false;
     xy[0] = x;
     xy[1] = y;

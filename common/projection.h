@@ -109,9 +109,10 @@ bool gn_projection_has_vignetting(const struct gn_projection *projection);
 double gn_projection_get_vignetting(const struct gn_projection *projection, double x, double y);
 
 /**
- * Moves *xy from a pixel to the one beside it, dx and dy in {-1, 0, 1}, as the sphere goes on: a
- * lat-long closes at its sides and over its poles, an octahedral map folds at its border. False,
- * and *xy untouched, beyond the picture, and beyond a cube's face.
+ * Moves *xy from a pixel by dx and dy, no more than the picture's or a cube's face's width and
+ * height, as the sphere goes on: a lat-long closes at its sides and over its poles, an octahedral
+ * map folds at its border, a cube's face meets the next. False, and *xy untouched, beyond the
+ * picture, and beyond a cube's corner, where three faces meet and nothing lies diagonally.
  */
 bool gn_projection_step(const struct gn_projection *projection, int dx, int dy, int xy[static 2]);
 

@@ -173,8 +173,42 @@ static void test_steps(void **state)
         int n_edge = 4 * 3 * 64 - 4; // steps over the border of a square, its corners' once
         assert_int_equal(n_refused, t == GN_PROJECTION_LATLONG      ? 0
                                     : t == GN_PROJECTION_OCTAHEDRAL ? 0
-                                    : t == GN_PROJECTION_CUBE       ? 6 * n_edge
+                                    : t == GN_PROJECTION_CUBE       ? 6 * 4 // its faces' corners
                                                                     : n_edge);
+    }
+}
+
+/* Long steps over a border go on as they began: each ends beside where the shorter one does. */
+static void test_long_steps(void **state)
+{
+    (void)state;
+    static const enum gn_projection_type types[] = {GN_PROJECTION_LATLONG, GN_PROJECTION_CUBE,
+                                                    GN_PROJECTION_OCTAHEDRAL};
+    for (size_t t = 0; t < GN_ARRAY_LEN(types); t++) {
+        struct gn_projection p = make(types[t], 64, 64);
+        for (int i = 0; i < p.width * p.height * 4; i++) {
+            int home[2] = {i / 4 % p.width, i / 4 / p.width}, last[2] = {home[0], home[1]};
+            int dx = i % 4 == 0   ? 1
+                     : i % 4 == 1 ? -1
+                                  : 0,
+                dy = i % 4 == 2   ? 1
+                     : i % 4 == 3 ? -1
+                                  : 0;
+            for (int n = 1; n <= 4; n++) {
+                int at[2] = {home[0], home[1]};
+                double d[3], e[3];
+                assert_true(gn_projection_step(&p, n * dx, n * dy, at));
+                assert_true(gn_projection_get_direction(&p, last[0] + 0.5, last[1] + 0.5, d));
+                assert_true(gn_projection_get_direction(&p, at[0] + 0.5, at[1] + 0.5, e));
+                double apart = hypot(hypot(d[0] - e[0], d[1] - e[1]), d[2] - e[2]);
+                if (!(apart > 0 && apart < 0.1))
+                    fail_msg("%s: %d steps of %d %d from %d %d: %g apart",
+                             gn_projection_get_name(p.type), n, dx, dy, home[0], home[1], apart);
+                bool is_back = at[0] == home[0] && at[1] == home[1];
+                assert_false(is_back);
+                memcpy(last, at, sizeof(last));
+            }
+        }
     }
 }
 
@@ -348,12 +382,19 @@ static void test_cube_edges(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_radial_axes),     cmocka_unit_test(test_mirrorball_axes),
-        cmocka_unit_test(test_latlong_axes),    cmocka_unit_test(test_cube_axes),
-        cmocka_unit_test(test_octahedral_axes), cmocka_unit_test(test_cube_edges),
-        cmocka_unit_test(test_steps),           cmocka_unit_test(test_radius_of_models),
-        cmocka_unit_test(test_round_trip),      cmocka_unit_test(test_outside),
-        cmocka_unit_test(test_refusals),        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_radial_axes),
+        cmocka_unit_test(test_mirrorball_axes),
+        cmocka_unit_test(test_latlong_axes),
+        cmocka_unit_test(test_cube_axes),
+        cmocka_unit_test(test_octahedral_axes),
+        cmocka_unit_test(test_cube_edges),
+        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_long_steps),
+        cmocka_unit_test(test_radius_of_models),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_outside),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
