@@ -140,16 +140,16 @@ static int make_lights(struct gn_partition *p, struct gn_light_list *list,
 {
     gn_pool_run(p->input->pool, p->plan->n_regions, sum_region, p);
     p->mean = p->map->figures.mean_luminance;
-    if (p->needs_samples) {
-        int rc = draw_samples(p, figures);
-        if (rc < 0)
-            return rc;
+    int rc = p->needs_samples ? draw_samples(p, figures) : 0, n_base = p->plan->n_regions;
+    if (rc == 0 && p->needs_samples)
         take_sample_figures(p);
-    }
-    if (p->settings->metric != GN_METRIC_LOG2 && !gn_partition_is_literal(p, GN_READ_SAMPLE_MAX))
-        p->max = gn_partition_get_smoothed_max(p->map);
+    if (rc == 0 && p->settings->metric != GN_METRIC_LOG2 &&
+        !gn_partition_is_literal(p, GN_READ_SAMPLE_MAX))
+        rc = gn_partition_get_smoothed_max(p->map, p->input->scratch, &p->max);
+    if (rc < 0)
+        return rc;
     gn_partition_count_lights(p, figures);
-    int rc = gn_partition_split_regions(p), n_base = p->plan->n_regions;
+    rc = gn_partition_split_regions(p);
     if (rc == 0)
         rc = add_lights(p, 0, n_base, list);
     if (rc >= 0 && gn_partition_is_literal(p, GN_READ_BRIGHTEST))

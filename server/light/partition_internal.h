@@ -58,9 +58,13 @@ static inline double gn_partition_get_luminance(const struct gn_partition *p, ui
     return gn_luminance(p->map->radiance.data + 3 * (size_t)texel);
 }
 
-/** The largest luminance after a 5 x 5 mean over texels that show something: one hot texel does not
- * decide for all. */
-double gn_partition_get_smoothed_max(const struct gn_radiance_map *map);
+/**
+ * The largest luminance after a mean over 5 x 5 texels that show something, as the sphere goes on
+ * beyond a border (at a cube's corner three faces meet, and there are fewer): one hot texel does
+ * not decide for all. Returns 0 or -ENOMEM.
+ */
+GN_MUST_USE int gn_partition_get_smoothed_max(const struct gn_radiance_map *map,
+                                              struct gn_scratch *scratch, double *out_max);
 
 /**
  * Decides which regions are bright and how many parts each is cut into: is_bright and n_parts. The

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "server/light/luminance.h"
+#include "server/light/partition_internal.h"
 #include "server/light/sh.h"
 #include "server/light/state.h"
 #include "tests/light_states.h"
@@ -100,6 +101,78 @@ static void lights_and_harmonics_agree(void **unused)
     }
     gn_lighting_state_unref(&state);
     light_fixture_finish(&f);
+}
+
+/* The mean of the 5 x 5 texels about one, as the sphere goes on. */
+static double get_mean_about(const struct gn_radiance_map *map, int x, int y)
+{
+    double sum = 0, weight = 0;
+    for (int i = 0; i < 25; i++) {
+        int at[2] = {x, y};
+        if (!gn_projection_step(&map->projection, i % 5 - 2, i / 5 - 2, at))
+            continue;
+        size_t texel = (size_t)at[1] * (size_t)map->radiance.width + (size_t)at[0];
+        sum += (double)map->solid_angle[texel] * gn_luminance(map->radiance.data + 3 * texel);
+        weight += (double)map->solid_angle[texel];
+    }
+    return weight > 0 ? sum / weight : 0;
+}
+
+/* The smoothed maximum of a map that is black but for 3 x 3 texels of luminance 1 about one. */
+static double smooth_lamp(enum gn_projection_type type, int width, int height, const int home[2])
+{
+    struct light_fixture f;
+    gn_scratch_place place = NULL;
+    struct gn_scratch *scratch = gn_scratch_borrow(&place);
+    assert_int_equal(light_fixture_init(&f, type, width, height), 0);
+    for (int i = 0; i < 9; i++) {
+        int at[2] = {home[0], home[1]};
+        assert_true(gn_projection_step(&f.frame.projection, i % 3 - 1, i / 3 - 1, at));
+        for (int c = 0; c < 3; c++)
+            gn_image_at(&f.image, at[0], at[1])[c] = 1;
+    }
+    f.frame.codes = &f.image;
+    const struct gn_light_options options = {.method = GN_LIGHT_PARTITION_SEED};
+    struct gn_lighting_state *state = make_state(&f, &options, NULL);
+    double max = 0, smoothed = 0;
+    for (int i = 0; i < f.image.width * f.image.height; i++)
+        max = fmax(max, get_mean_about(state->map, i % f.image.width, i / f.image.width));
+    assert_int_equal(gn_partition_get_smoothed_max(state->map, scratch, &smoothed), 0);
+    assert_near(smoothed, max, 1e-12);
+    gn_lighting_state_unref(&state);
+    gn_scratch_give_back(&place, &scratch);
+    gn_scratch_finish(&place);
+    light_fixture_finish(&f);
+    return smoothed;
+}
+
+/* A lamp across a border of the picture is as bright as one in the middle. */
+static void borders_change_no_smoothed_maximum(void **unused)
+{
+    (void)unused;
+    static const struct {
+        enum gn_projection_type type;
+        int width, height, middle[2], border[5][2];
+        double tolerance; // for texels of a lamp that are not alike
+    } maps[] = {
+        {GN_PROJECTION_LATLONG, 128, 64, {64, 32}, {{0, 32}, {127, 32}}, 1e-6},
+        {GN_PROJECTION_LATLONG, 128, 64, {64, 0}, {{0, 0}, {127, 0}}, 1e-6},
+        {GN_PROJECTION_OCTAHEDRAL, 64, 64, {32, 32}, {{0, 9}, {63, 9}, {9, 0}, {9, 63}}, 1e-6},
+        {GN_PROJECTION_CUBE,
+         128,
+         768,
+         {64, 64},
+         {{0, 64}, {127, 128 + 70}, {64, 0}, {70, 128}, {64, 383}},
+         0.03},
+    };
+    for (size_t k = 0; k < sizeof(maps) / sizeof(maps[0]); k++) {
+        double middle = smooth_lamp(maps[k].type, maps[k].width, maps[k].height, maps[k].middle);
+        for (int i = 0; i < 5 && (i == 0 || maps[k].border[i][0] + maps[k].border[i][1] > 0); i++) {
+            double border =
+                smooth_lamp(maps[k].type, maps[k].width, maps[k].height, maps[k].border[i]);
+            assert_near(border / middle, 1, maps[k].tolerance);
+        }
+    }
 }
 
 static void the_papers_reading_is_literal(void **unused)
@@ -364,6 +437,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(energy_is_kept_and_the_number_met),
         cmocka_unit_test(lights_and_harmonics_agree),
+        cmocka_unit_test(borders_change_no_smoothed_maximum),
         cmocka_unit_test(the_papers_reading_is_literal),
         cmocka_unit_test(each_reading_can_be_mended),
         cmocka_unit_test(constant_light_has_a_light_per_region),
