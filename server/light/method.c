@@ -12,7 +12,7 @@ static const struct gn_light_maker makers[GN_LIGHT_METHOD_COUNT] = {
     [GN_LIGHT_MEDIAN_CUT] = {"median-cut", gn_median_cut_make_lights},
     [GN_LIGHT_VARIANCE] = {"variance", gn_variance_make_lights},
     [GN_LIGHT_INVERSION] = {"inversion", gn_inversion_make_lights},
-    [GN_LIGHT_QUADTREE] = {"quadtree", gn_quadtree_make_lights},
+    [GN_LIGHT_QUADTREE] = {"quadtree", gn_quadtree_make_lights, true},
 };
 
 const struct gn_light_maker *gn_light_maker_get(enum gn_light_method method)

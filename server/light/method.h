@@ -15,10 +15,12 @@ struct gn_light_input {
     const struct gn_light_settings *settings;
     const struct gn_partition_plan *plan;     // base division and the cells of the fill
     const struct gn_lighting_state *previous; // the stream's last state, or NULL
-    const struct gn_light_memory *remembered; // of the last frame; NULL: of other settings, plan
-    struct gn_light_memory *memory;           // for the next frame, zeroed: the method may fill it
-    struct gn_scratch *scratch;               // working memory, given back after the call
-    struct gn_pool *pool;                     // may be NULL
+    // Of the last frame. NULL: of other settings, or of another plan that the method's marks are
+    // of.
+    const struct gn_light_memory *remembered;
+    struct gn_light_memory *memory; // for the next frame, zeroed: the method may fill it
+    struct gn_scratch *scratch;     // working memory, given back after the call
+    struct gn_pool *pool;           // may be NULL
 };
 
 /**
@@ -33,6 +35,7 @@ typedef int gn_light_make(const struct gn_light_input *input, struct gn_light_li
 struct gn_light_maker {
     const char *name;
     gn_light_make *make;
+    bool is_of_world; // what it remembers is of the world's cells: a probe may turn
 };
 
 /** NULL for a bad method. Static. */

@@ -10,20 +10,15 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "server/light/grid.h"
 
 /* Split above 1.2 thresholds, merge below 0.8. */
 static const double split_at = 1.2, merge_at = 0.8;
-/* The threshold stays while the number of lights is within this share of the wanted one, and else
- * follows within this time, s; it does so at once where the number more than doubles. */
-static const double slack = 0.25, follow_time = 1;
-
 enum { DEPTH_MAX = 8 }; // of GN_GRID_SIDE_MAX
 
-/* What is kept in the memory's figures. */
-enum { THRESHOLD, CAPTURE_TIME, SIDE };
+/* Of the memory's figures; its marks are the nodes that are split. */
+enum { THRESHOLD };
 
 struct tree {
     const struct gn_grid *grid;
@@ -131,50 +126,38 @@ static double find_threshold(struct tree t, int n)
     return high;
 }
 
-/* The threshold of this frame, from the last one's. */
-static double follow_threshold(struct tree *t, const struct gn_light_memory *last, int n_aim,
-                               int64_t capture_time_ns)
+/* The threshold of this frame, from the last one's; its own where the number would more than
+ * double. */
+static double follow_threshold(struct tree *t, const struct gn_light_input *input, double kept)
 {
-    t->threshold = last->figure[THRESHOLD];
+    int n_aim = input->settings->n_aim;
+    t->threshold = kept;
     int n = count_leaves(t, 0, 0, 0, 2 * n_aim);
-    if (n > 2 * n_aim)
-        return find_threshold(*t, n_aim);
-    if (fabs((double)(n - n_aim)) <= fmax(slack * n_aim, 3))
-        return t->threshold;
-    double s = fmax(1e-9 * (double)capture_time_ns - last->figure[CAPTURE_TIME], 0);
-    double ratio = find_threshold(*t, n_aim) / t->threshold;
-    return t->threshold * pow(ratio, 1 - exp(-s / follow_time));
-}
-
-/* What the last frame kept, where this one has the same settings and as many cells. */
-static const struct gn_light_memory *recall(const struct gn_light_input *input,
-                                            const struct gn_grid *grid)
-{
-    const struct gn_light_memory *last = input->previous ? input->previous->memory : NULL;
-    if (!last || !last->marks || last->figure[SIDE] != grid->side ||
-        memcmp(&last->settings, &input->memory->settings, sizeof(last->settings)) != 0)
-        return NULL;
-    return last;
+    double ratio = (double)n / n_aim;
+    if (gn_light_is_count_kept(ratio))
+        return kept;
+    double fresh = find_threshold(*t, n_aim);
+    return ratio > 2 ? fresh : gn_light_follow(input, kept, fresh, ratio);
 }
 
 static int make_leaves(struct tree *t, const struct gn_light_input *input)
 {
-    const struct gn_light_memory *last = recall(input, t->grid);
+    const struct gn_light_memory *last = input->remembered;
     struct gn_light_memory *memory = input->memory;
-    int rc = fill_energies(t), n_aim = input->settings->n_aim;
+    int rc = fill_energies(t);
     if (rc < 0 || !(t->energy[0] > 0))
         return rc;
     memory->n_marks = (int)(t->start[t->depth + 1] + 63) / 64;
     memory->marks = calloc((size_t)memory->n_marks, sizeof(*memory->marks));
     if (!memory->marks)
         return -ENOMEM;
+    if (last && last->n_marks != memory->n_marks) // of a grid of another side, or of a black map
+        last = NULL;
     t->is_split = memory->marks;
     t->was_split = last ? last->marks : NULL;
-    t->threshold = last ? follow_threshold(t, last, n_aim, input->map->capture_time_ns)
-                        : find_threshold(*t, n_aim);
+    t->threshold = last ? follow_threshold(t, input, last->figure[THRESHOLD])
+                        : find_threshold(*t, input->settings->n_aim);
     memory->figure[THRESHOLD] = t->threshold;
-    memory->figure[CAPTURE_TIME] = 1e-9 * (double)input->map->capture_time_ns;
-    memory->figure[SIDE] = t->grid->side;
     return add_leaves(t, 0, 0, 0);
 }
 

@@ -55,11 +55,14 @@ static int take_lights(struct gn_lighting_state *state, const struct gn_light_li
     return 0;
 }
 
-/* What was kept under the same settings and plan. */
+/* What was kept under the same settings, and under the same plan where that says what it is of. */
 static const struct gn_light_memory *recall(const struct gn_lighting_state *state,
                                             const struct gn_lighting_state *previous)
 {
-    if (!previous || !previous->memory || previous->plan != state->plan ||
+    if (!previous || !previous->memory)
+        return NULL;
+    bool is_of_plan = !gn_light_maker_get(state->memory->settings.method)->is_of_world;
+    if ((is_of_plan && previous->plan != state->plan) ||
         memcmp(&previous->memory->settings, &state->memory->settings,
                sizeof(state->memory->settings)) != 0)
         return NULL;
