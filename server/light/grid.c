@@ -321,17 +321,12 @@ int gn_grid_init(struct gn_grid *grid, const struct gn_light_input *input)
         return rc;
     grid->plan = input->memory->grid;
     grid->side = grid->plan->side;
-    grid->cell = calloc((size_t)grid->side * (size_t)grid->side, sizeof(*grid->cell));
+    grid->cell = gn_scratch_take_zeroed(input->scratch, (size_t)grid->side * (size_t)grid->side,
+                                        sizeof(*grid->cell));
     if (!grid->cell)
         return -ENOMEM;
     gn_pool_run(input->pool, GN_GRID_QUARTERS, sum_quarter, grid);
     return 0;
-}
-
-void gn_grid_finish(struct gn_grid *grid)
-{
-    free(grid->cell);
-    *grid = (struct gn_grid){0};
 }
 
 void gn_grid_cell_add(struct gn_grid_cell *cell, const struct gn_grid_cell *other)

@@ -51,7 +51,7 @@ struct gn_grid {
     struct gn_grid_plan *plan; // borrowed of the memory
     const struct gn_radiance_map *map;
     int side;
-    struct gn_grid_cell *cell; // [side * side], row by row, owned
+    struct gn_grid_cell *cell; // [side * side], row by row, of the input's scratch
 };
 
 /**
@@ -59,7 +59,6 @@ struct gn_grid {
  * in the input's memory. Same bits whatever the pool's size. Returns 0 or -ENOMEM.
  */
 GN_MUST_USE int gn_grid_init(struct gn_grid *grid, const struct gn_light_input *input);
-void gn_grid_finish(struct gn_grid *grid);
 
 void gn_grid_cell_add(struct gn_grid_cell *cell, const struct gn_grid_cell *other);
 /** As gn_patch_get_light. */

@@ -31,21 +31,32 @@ struct placed_item {
     int index;
 };
 
+/* Memory for sorting texels. */
+struct item_sort {
+    int capacity;
+    struct placed_item *places;
+    struct gn_grid_cell *copy;
+    double (*far)[4]; // sums of a texel and all behind it
+};
+
+/* Memory is of the scratch. */
 struct cutting {
     const struct gn_grid *grid;
     const struct gn_grid_cutter *cutter;
-    double (*table)[4]; // [side + 1][side + 1], owned: sums over the cells above and to the left
+    struct gn_scratch *scratch;
+    double (*table)[4]; // [side + 1][side + 1]: sums over the cells above and to the left
     double floor;       // what the table's rounding leaves of darkness is no more: no energy
     int n;
-    struct region *regions; // [n_aim], owned
+    struct region *regions; // [n_aim]
     int n_items, items_capacity;
-    struct gn_grid_cell *items; // owned
+    struct gn_grid_cell *items;
+    struct item_sort sort;
 };
 
 static int make_table(struct cutting *c)
 {
     int side = c->grid->side, pitch = side + 1;
-    c->table = malloc((size_t)pitch * (size_t)pitch * sizeof(*c->table));
+    c->table = gn_scratch_take(c->scratch, (size_t)pitch * (size_t)pitch, sizeof(*c->table));
     if (!c->table)
         return -ENOMEM;
     memset(c->table, 0, (size_t)pitch * sizeof(*c->table));
@@ -171,13 +182,6 @@ static int get_longest_axis(const struct gn_grid_cell *items, int n)
     return axis;
 }
 
-/* Memory for sorting n texels. */
-struct item_sort {
-    struct placed_item *places;
-    struct gn_grid_cell *copy;
-    double (*far)[4]; // sums of a texel and all behind it
-};
-
 static int find_item_place(const struct cutting *c, struct gn_grid_cell *items, int n,
                            const struct item_sort *sort)
 {
@@ -205,18 +209,20 @@ static int find_item_place(const struct cutting *c, struct gn_grid_cell *items, 
 
 /* Sorts a set of texels along its longest axis and finds the best place to cut it: the number of
  * texels before it; 0: none; -ENOMEM. */
-static int cut_items(const struct cutting *c, const struct region *r)
+static int cut_items(struct cutting *c, const struct region *r)
 {
-    size_t n = (size_t)r->n_items;
-    struct item_sort sort = {malloc(n * sizeof(*sort.places)), malloc(n * sizeof(*sort.copy)),
-                             malloc(n * sizeof(*sort.far))};
-    int rc = -ENOMEM;
-    if (sort.places && sort.copy && sort.far)
-        rc = find_item_place(c, c->items + r->first_item, r->n_items, &sort);
-    free(sort.places);
-    free(sort.copy);
-    free(sort.far);
-    return rc;
+    struct item_sort *sort = &c->sort;
+    if (r->n_items > sort->capacity) {
+        int capacity = r->n_items > 2 * sort->capacity ? r->n_items : 2 * sort->capacity;
+        size_t n = (size_t)capacity;
+        *sort = (struct item_sort){.places = gn_scratch_take(c->scratch, n, sizeof(*sort->places)),
+                                   .copy = gn_scratch_take(c->scratch, n, sizeof(*sort->copy)),
+                                   .far = gn_scratch_take(c->scratch, n, sizeof(*sort->far))};
+        if (!sort->places || !sort->copy || !sort->far)
+            return -ENOMEM;
+        sort->capacity = capacity;
+    }
+    return find_item_place(c, c->items + r->first_item, r->n_items, sort);
 }
 
 static int get_area(const struct region *r)
@@ -246,7 +252,8 @@ static int open_cells(struct cutting *c, struct region *r)
         n += gn_grid_count_items(c->grid, get_cell(c, r, i));
     if (n > c->items_capacity) {
         int capacity = n > 2 * c->items_capacity ? n : 2 * c->items_capacity;
-        struct gn_grid_cell *items = realloc(c->items, (size_t)capacity * sizeof(*items));
+        struct gn_grid_cell *items = gn_scratch_grow(c->scratch, c->items, (size_t)c->n_items,
+                                                     (size_t)capacity, sizeof(*items));
         if (!items)
             return -ENOMEM;
         c->items = items;
@@ -383,9 +390,9 @@ int gn_grid_cut(const struct gn_light_input *input, const struct gn_grid_cutter 
                 struct gn_light_list *list)
 {
     struct gn_grid grid;
-    struct cutting c = {.grid = &grid, .cutter = cutter};
+    struct cutting c = {.grid = &grid, .cutter = cutter, .scratch = input->scratch};
     int n_aim = input->settings->n_aim, rc = gn_grid_init(&grid, input);
-    c.regions = malloc((size_t)n_aim * sizeof(*c.regions));
+    c.regions = gn_scratch_take(c.scratch, (size_t)n_aim, sizeof(*c.regions));
     if (rc == 0)
         rc = c.regions ? make_table(&c) : -ENOMEM;
     if (rc == 0)
@@ -403,9 +410,5 @@ int gn_grid_cut(const struct gn_light_input *input, const struct gn_grid_cutter 
         light.id = r->id;
         rc = gn_light_list_add(list, &light);
     }
-    free(c.table);
-    free(c.regions);
-    free(c.items);
-    gn_grid_finish(&grid);
     return rc;
 }

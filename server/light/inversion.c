@@ -10,7 +10,6 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/octahedral.h"
@@ -19,42 +18,34 @@
 /* Points near a block of so many cells on a side are looked for together. */
 enum { BLOCK = 8 };
 
+/* Memory is of the scratch. */
 struct points {
     const struct gn_grid *grid;
+    struct gn_scratch *scratch;
     int n;
-    double *rows;             // [side + 1] energy of the rows above, owned
-    double *columns;          // [side][side + 1] energy to the left in the row, owned
-    float (*dir)[3];          // [n] owned
-    struct gn_grid_cell *sum; // [n] of what is nearest to a point, owned
-    uint8_t *n_in_cell;       // [side * side] points in a cell, 2 for more, owned
+    double *rows;             // [side + 1] energy of the rows above
+    double *columns;          // [side][side + 1] energy to the left in the row
+    float (*dir)[3];          // [n]
+    struct gn_grid_cell *sum; // [n] of what is nearest to a point
+    uint8_t *n_in_cell;       // [side * side] points in a cell, 2 for more
     int n_near;
-    int *near; // [n] candidates of the block at hand, owned
+    int *near; // [n] candidates of the block at hand
     int items_capacity;
-    struct gn_grid_cell *items; // owned
+    struct gn_grid_cell *items;
 };
 
 static int reserve(struct points *p, int n)
 {
-    size_t side = (size_t)p->grid->side;
+    size_t side = (size_t)p->grid->side, n_points = (size_t)n;
+    struct gn_scratch *s = p->scratch;
     p->n = n;
-    p->rows = malloc((side + 1) * sizeof(*p->rows));
-    p->columns = malloc(side * (side + 1) * sizeof(*p->columns));
-    p->dir = malloc((size_t)n * sizeof(*p->dir));
-    p->sum = calloc((size_t)n, sizeof(*p->sum));
-    p->n_in_cell = calloc(side * side, sizeof(*p->n_in_cell));
-    p->near = malloc((size_t)n * sizeof(*p->near));
+    p->rows = gn_scratch_take(s, side + 1, sizeof(*p->rows));
+    p->columns = gn_scratch_take(s, side * (side + 1), sizeof(*p->columns));
+    p->dir = gn_scratch_take(s, n_points, sizeof(*p->dir));
+    p->sum = gn_scratch_take_zeroed(s, n_points, sizeof(*p->sum));
+    p->n_in_cell = gn_scratch_take_zeroed(s, side * side, sizeof(*p->n_in_cell));
+    p->near = gn_scratch_take(s, n_points, sizeof(*p->near));
     return p->rows && p->columns && p->dir && p->sum && p->n_in_cell && p->near ? 0 : -ENOMEM;
-}
-
-static void finish(struct points *p)
-{
-    free(p->rows);
-    free(p->columns);
-    free(p->dir);
-    free(p->sum);
-    free(p->n_in_cell);
-    free(p->near);
-    free(p->items);
 }
 
 static void add_energies(struct points *p)
@@ -160,7 +151,7 @@ static int give_items(struct points *p, int cell)
 {
     int n = gn_grid_count_items(p->grid, cell);
     if (n > p->items_capacity) {
-        struct gn_grid_cell *items = realloc(p->items, (size_t)n * sizeof(*items));
+        struct gn_grid_cell *items = gn_scratch_take(p->scratch, (size_t)n, sizeof(*items));
         if (!items)
             return -ENOMEM;
         p->items = items;
@@ -220,12 +211,10 @@ int gn_inversion_make_lights(const struct gn_light_input *input, struct gn_light
                              struct gn_light_figures *figures)
 {
     struct gn_grid grid;
-    struct points points = {.grid = &grid};
+    struct points points = {.grid = &grid, .scratch = input->scratch};
     int rc = gn_grid_init(&grid, input);
     if (rc == 0)
         rc = make_lights(&points, input->settings->n_aim, list);
     figures->n_samples = points.n;
-    finish(&points);
-    gn_grid_finish(&grid);
     return rc;
 }

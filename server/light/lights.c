@@ -86,7 +86,8 @@ int gn_light_list_add(struct gn_light_list *list, const struct gn_light *light)
 {
     if (list->n == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 128;
-        struct gn_light *lights = realloc(list->lights, (size_t)capacity * sizeof(*lights));
+        struct gn_light *lights = gn_scratch_grow(list->scratch, list->lights, (size_t)list->n,
+                                                  (size_t)capacity, sizeof(*lights));
         if (!lights)
             return -ENOMEM;
         list->lights = lights;
@@ -118,12 +119,6 @@ int gn_light_list_add_fill(struct gn_light_list *list, const struct gn_radiance_
         ++*out_n;
     }
     return 0;
-}
-
-void gn_light_list_finish(struct gn_light_list *list)
-{
-    free(list->lights);
-    *list = (struct gn_light_list){0};
 }
 
 bool gn_light_is_count_kept(double count_ratio)

@@ -13,6 +13,7 @@
 
 struct gn_grid_plan;   // server/light/grid.h
 struct gn_light_input; // server/light/method.h
+struct gn_scratch;     // server/light/scratch.h
 
 /** Sums over texels, in double. A value; zeroed: empty. */
 struct gn_patch {
@@ -51,10 +52,11 @@ bool gn_patch_get_light(const struct gn_patch *patch, struct gn_light *out_light
 #define GN_LIGHT_ID_DARK (UINT64_C(2) << 60)
 #define GN_LIGHT_ID_FILL (UINT64_C(3) << 60)
 
-/** A list that grows. Thread-safety: unsafe. */
+/** A list that grows. Zeroed but for the scratch: empty. Thread-safety: unsafe. */
 struct gn_light_list {
     int n, capacity;
-    struct gn_light *lights; // owned
+    struct gn_light *lights;    // of the scratch
+    struct gn_scratch *scratch; // borrowed
 };
 /** Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_light_list_add(struct gn_light_list *list, const struct gn_light *light);
@@ -62,7 +64,6 @@ GN_MUST_USE int gn_light_list_add(struct gn_light_list *list, const struct gn_li
 GN_MUST_USE int gn_light_list_add_fill(struct gn_light_list *list,
                                        const struct gn_radiance_map *map,
                                        const struct gn_partition_plan *plan, int *out_n);
-void gn_light_list_finish(struct gn_light_list *list);
 
 /**
  * The options with each default of their method filled in, and what follows from them. Compared

@@ -5,7 +5,6 @@
 #include <errno.h>
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "server/light/luminance.h"
@@ -28,14 +27,13 @@ struct pyramid {
     const struct gn_map_sampling *sampling;
     int n_levels;
     int width[N_LEVELS_MAX], height[N_LEVELS_MAX];
-    float *level[N_LEVELS_MAX]; // into data, from level 1
-    float *data;
-    float share;        // of the brightest: 1 / its luminance
-    float plain_weight; // of each texel that shows light; 0: its solid angle
-    double scale;       // importance m = scale * value
+    float *level[N_LEVELS_MAX]; // of the scratch; 0: two rows of the map's values
+    float share;                // of the brightest: 1 / its luminance
+    float plain_weight;         // of each texel that shows light; 0: its solid angle
+    double scale;               // importance m = scale * value
 };
 
-static int init_pyramid(struct pyramid *p, int width, int height)
+static int init_pyramid(struct pyramid *p, int width, int height, struct gn_scratch *scratch)
 {
     size_t n = 0, offset[N_LEVELS_MAX];
     for (int w = width, h = height;; w = (w + 1) / 2, h = (h + 1) / 2) {
@@ -47,12 +45,12 @@ static int init_pyramid(struct pyramid *p, int width, int height)
             break;
     }
     // the map's values, two rows at a time, behind the levels
-    p->data = malloc((n + 2 * (size_t)width) * sizeof(*p->data));
-    if (!p->data)
+    float *data = gn_scratch_take(scratch, n + 2 * (size_t)width, sizeof(*data));
+    if (!data)
         return -ENOMEM;
     for (int i = 1; i < p->n_levels; i++)
-        p->level[i] = p->data + offset[i];
-    p->level[0] = p->data + n;
+        p->level[i] = data + offset[i];
+    p->level[0] = data + n;
     return 0;
 }
 
@@ -202,22 +200,23 @@ static double get_threshold(void *context, const struct gn_penrose_tile *point, 
     return importance * (low < s->n_kept && s->kept[low] == get_id(point) ? stay : come);
 }
 
-static int grow(struct gn_map_samples *s)
+static int grow(struct gn_map_samples *s, struct gn_scratch *scratch)
 {
-    int capacity = s->capacity ? 2 * s->capacity : 1024;
-    uint32_t *texel = realloc(s->texel, (size_t)capacity * sizeof(*texel));
-    s->texel = texel ? texel : s->texel;
-    uint64_t *id = realloc(s->id, (size_t)capacity * sizeof(*id));
-    s->id = id ? id : s->id;
+    size_t n = (size_t)s->n, capacity = s->capacity ? 2 * (size_t)s->capacity : 1024;
+    uint32_t *texel = gn_scratch_grow(scratch, s->texel, n, capacity, sizeof(*texel));
+    uint64_t *id = gn_scratch_grow(scratch, s->id, n, capacity, sizeof(*id));
     if (!texel || !id)
         return -ENOMEM;
-    s->capacity = capacity;
+    s->texel = texel;
+    s->id = id;
+    s->capacity = (int)capacity;
     return 0;
 }
 
 /* Where samples go. */
 struct sink {
     struct gn_map_samples *samples;
+    struct gn_scratch *scratch;
     struct pyramid *pyramid;
 };
 
@@ -226,7 +225,7 @@ static int accept_sample(void *context, const struct gn_penrose_sample *sample)
     struct sink *sink = context;
     struct gn_map_samples *s = sink->samples;
     double at[2] = {sample->x, sample->y};
-    if (s->n == s->capacity && grow(s) < 0)
+    if (s->n == s->capacity && grow(s, sink->scratch) < 0)
         return -ENOMEM;
     if (sink->pyramid->sampling->is_relaxed) {
         int phase = gn_penrose_get_phase(sample->importance);
@@ -242,14 +241,14 @@ static int accept_sample(void *context, const struct gn_penrose_sample *sample)
 }
 
 int gn_map_samples_draw(const struct gn_radiance_map *map, const struct gn_map_sampling *sampling,
-                        struct gn_map_samples *samples)
+                        struct gn_scratch *scratch, struct gn_map_samples *samples)
 {
     double max = map->figures.max_luminance;
     if (!(max > 0))
         return 0;
     struct pyramid pyramid = {
         .map = map, .sampling = sampling, .share = (float)fmin(1 / max, (double)FLT_MAX)};
-    int rc = init_pyramid(&pyramid, map->radiance.width, map->radiance.height);
+    int rc = init_pyramid(&pyramid, map->radiance.width, map->radiance.height, scratch);
     if (rc < 0)
         return rc;
     if (sampling->is_plain)
@@ -263,17 +262,9 @@ int gn_map_samples_draw(const struct gn_radiance_map *map, const struct gn_map_s
         pyramid.scale = size * size * unit / (GN_PENROSE_DENSITY * power);
         const struct gn_penrose_importance importance = {size, &pyramid, get_at, get_max,
                                                          sampling->kept ? get_threshold : NULL};
-        struct sink sink = {samples, &pyramid};
+        struct sink sink = {samples, scratch, &pyramid};
         rc = gn_penrose_sample_domain(&importance, accept_sample, &sink);
         samples->power = power;
     }
-    free(pyramid.data);
     return rc;
-}
-
-void gn_map_samples_finish(struct gn_map_samples *samples)
-{
-    free(samples->texel);
-    free(samples->id);
-    *samples = (struct gn_map_samples){0};
 }

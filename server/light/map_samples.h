@@ -12,6 +12,7 @@
 
 #include "proto/attr.h"
 #include "server/light/radiance_map.h"
+#include "server/light/scratch.h"
 
 /** How to draw. */
 struct gn_map_sampling {
@@ -23,11 +24,11 @@ struct gn_map_sampling {
     int n_kept;           // at 0.95 of their importance, others come at 1.05
 };
 
-/** Samples in the tiles' own order; the lists grow as they come. Thread-safety: unsafe. */
+/** Samples in the tiles' own order, in lists of the scratch. Thread-safety: unsafe. */
 struct gn_map_samples {
     int n, capacity;
-    uint32_t *texel; // [n] index into the map; many samples may share a bright one; owned
-    uint64_t *id;    // [n] of their tiles, below 2^62; the same in each map of the size; owned
+    uint32_t *texel; // [n] index into the map; many samples may share a bright one
+    uint64_t *id;    // [n] of their tiles, below 2^62; the same in each map of the size
     double power;    // Y dOmega that each stands for
 };
 
@@ -35,12 +36,11 @@ struct gn_map_samples {
  * Samples of the map with the importance Y dOmega/dA per unit of picture area, which makes each
  * stand for the same power. The wanted number is missed by a few percent, more below 64, and left
  * so. A moved sample stays in the light that it was accepted for: it is not moved to where less
- * than half of the importance is. A black map gives none. samples must be zeroed; finish frees.
- * Returns 0 or -ENOMEM.
+ * than half of the importance is. A black map gives none. samples must be zeroed. Returns 0
+ * or -ENOMEM.
  */
 GN_MUST_USE int gn_map_samples_draw(const struct gn_radiance_map *map,
                                     const struct gn_map_sampling *sampling,
-                                    struct gn_map_samples *samples);
-void gn_map_samples_finish(struct gn_map_samples *samples);
+                                    struct gn_scratch *scratch, struct gn_map_samples *samples);
 
 #endif

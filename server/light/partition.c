@@ -9,7 +9,6 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "server/light/luminance.h"
@@ -71,7 +70,7 @@ static int draw_samples(struct gn_partition *p, struct gn_light_figures *figures
                                              .is_plain =
                                                  gn_partition_is_literal(p, GN_READ_PLAIN_SAMPLING),
                                              .is_relaxed = p->settings->relaxed};
-    int rc = gn_map_samples_draw(p->map, &sampling, &p->samples);
+    int rc = gn_map_samples_draw(p->map, &sampling, p->input->scratch, &p->samples);
     if (rc == 0)
         rc = sort_samples(p);
     figures->n_samples = p->samples.n;
@@ -192,8 +191,5 @@ int gn_partition_make_lights(const struct gn_light_input *input, struct gn_light
     if (!(p.map->figures.mean_luminance > 0))
         return 0; // all black: no lights
     int rc = take_memory(&p);
-    if (rc == 0)
-        rc = make_lights(&p, list, figures);
-    gn_map_samples_finish(&p.samples);
-    return rc;
+    return rc < 0 ? rc : make_lights(&p, list, figures);
 }

@@ -30,7 +30,7 @@ static int draw(const struct gn_light_input *input, int n_wanted, struct gn_map_
         sampling.kept = remembered->marks;
         sampling.n_kept = remembered->n_marks;
     }
-    return gn_map_samples_draw(map, &sampling, samples);
+    return gn_map_samples_draw(map, &sampling, input->scratch, samples);
 }
 
 static int compare_ids(const void *a, const void *b)
@@ -79,13 +79,12 @@ int gn_penrose_make_lights(const struct gn_light_input *input, struct gn_light_l
     int n_wanted = settings->n_aim > n_fill ? settings->n_aim - n_fill : 1;
     int rc = draw(input, n_wanted, &samples);
     if (rc == 0)
-        rc = gn_penrose_weigh_samples(map, &samples, settings, input->pool, list);
+        rc = gn_penrose_weigh_samples(input, &samples, list);
     if (rc == 0)
         rc = remember(input->memory, &samples);
     if (rc == 0 && samples.n == 0 && map->figures.mean_luminance > 0)
         rc = add_whole(input, list);
     figures->n_samples = samples.n;
-    gn_map_samples_finish(&samples);
     if (rc == 0 && !(settings->literal & GN_READ_DISCARD_DARK))
         rc = gn_light_list_add_fill(list, map, plan, &figures->n_fill_lights);
     return rc;

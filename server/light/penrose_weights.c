@@ -273,17 +273,16 @@ static int compare_placed(const void *a, const void *b)
     return (p->sample > q->sample) - (p->sample < q->sample);
 }
 
-static int find_sites(struct cells *cells, const struct gn_map_samples *samples)
+static int find_sites(struct cells *cells, const struct gn_map_samples *samples,
+                      struct gn_scratch *scratch)
 {
     size_t n = (size_t)samples->n;
-    struct placed *placed = malloc(n * sizeof(*placed));
-    cells->order = malloc(n * sizeof(*cells->order));
-    cells->sites = malloc(n * sizeof(*cells->sites));
-    cells->all = malloc(n * sizeof(*cells->all));
-    if (!placed || !cells->order || !cells->sites || !cells->all) {
-        free(placed);
+    struct placed *placed = gn_scratch_take(scratch, n, sizeof(*placed));
+    cells->order = gn_scratch_take(scratch, n, sizeof(*cells->order));
+    cells->sites = gn_scratch_take(scratch, n, sizeof(*cells->sites));
+    cells->all = gn_scratch_take(scratch, n, sizeof(*cells->all));
+    if (!placed || !cells->order || !cells->sites || !cells->all)
         return -ENOMEM;
-    }
     for (int i = 0; i < samples->n; i++)
         placed[i] = (struct placed){samples->texel[i], i};
     qsort(placed, n, sizeof(*placed), compare_placed);
@@ -296,7 +295,6 @@ static int find_sites(struct cells *cells, const struct gn_map_samples *samples)
         }
         cells->sites[cells->n_sites - 1].n++;
     }
-    free(placed);
     return 0;
 }
 
@@ -324,40 +322,31 @@ static int add_cell_lights(const struct cells *cells, const struct gn_map_sample
     return 0;
 }
 
-static int add_cells(const struct gn_radiance_map *map, const struct gn_map_samples *samples,
-                     struct gn_pool *pool, struct gn_light_list *list)
+static int add_cells(const struct gn_light_input *input, const struct gn_map_samples *samples,
+                     struct gn_light_list *list)
 {
-    struct cells cells = {.map = map};
+    struct cells cells = {.map = input->map};
+    struct gn_scratch *scratch = input->scratch;
     if (samples->n == 0)
         return 0;
-    int rc = find_sites(&cells, samples);
-    if (rc == 0) {
-        size_t n = (size_t)cells.n_sites * N_BANDS;
-        cells.patches = calloc(n, sizeof(*cells.patches));
-        cells.near_sites = malloc(2 * n * sizeof(*cells.near_sites));
-        cells.site = malloc((size_t)N_BANDS * GROUP * BLOCK * (size_t)map->radiance.width *
-                            sizeof(*cells.site));
-        rc = cells.patches && cells.near_sites && cells.site ? 0 : -ENOMEM;
-    }
-    if (rc == 0) {
-        gn_pool_run(pool, N_BANDS, sum_band, &cells);
-        rc = add_cell_lights(&cells, samples, list);
-    }
-    free(cells.site);
-    free(cells.near_sites);
-    free(cells.patches);
-    free(cells.all);
-    free(cells.sites);
-    free(cells.order);
-    return rc;
+    int rc = find_sites(&cells, samples, scratch);
+    if (rc < 0)
+        return rc;
+    size_t n = (size_t)cells.n_sites * N_BANDS, n_rows = (size_t)N_BANDS * GROUP * BLOCK;
+    cells.patches = gn_scratch_take_zeroed(scratch, n, sizeof(*cells.patches));
+    cells.near_sites = gn_scratch_take(scratch, 2 * n, sizeof(*cells.near_sites));
+    cells.site =
+        gn_scratch_take(scratch, n_rows * (size_t)input->map->radiance.width, sizeof(*cells.site));
+    if (!cells.patches || !cells.near_sites || !cells.site)
+        return -ENOMEM;
+    gn_pool_run(input->pool, N_BANDS, sum_band, &cells);
+    return add_cell_lights(&cells, samples, list);
 }
 
-int gn_penrose_weigh_samples(const struct gn_radiance_map *map,
-                             const struct gn_map_samples *samples,
-                             const struct gn_light_settings *settings, struct gn_pool *pool,
-                             struct gn_light_list *list)
+int gn_penrose_weigh_samples(const struct gn_light_input *input,
+                             const struct gn_map_samples *samples, struct gn_light_list *list)
 {
-    return settings->weights == GN_WEIGHTS_PARTITION
-               ? add_cells(map, samples, pool, list)
-               : add_plain_lights(map, samples, settings, list);
+    return input->settings->weights == GN_WEIGHTS_PARTITION
+               ? add_cells(input, samples, list)
+               : add_plain_lights(input->map, samples, input->settings, list);
 }

@@ -6,8 +6,8 @@
 #ifndef GN_SERVER_LIGHT_PENROSE_WEIGHTS_H
 #define GN_SERVER_LIGHT_PENROSE_WEIGHTS_H
 
-#include "server/light/lights.h"
 #include "server/light/map_samples.h"
+#include "server/light/method.h"
 
 /** Kind of the ids of samples: above all that regions have. */
 #define GN_PENROSE_LIGHT_ID (UINT64_C(1) << 63)
@@ -21,9 +21,8 @@
  *     Samples of one texel share. Exact per channel.
  * The same bits whatever the pool's size. Returns 0 or -ENOMEM.
  */
-GN_MUST_USE int gn_penrose_weigh_samples(const struct gn_radiance_map *map,
+GN_MUST_USE int gn_penrose_weigh_samples(const struct gn_light_input *input,
                                          const struct gn_map_samples *samples,
-                                         const struct gn_light_settings *settings,
-                                         struct gn_pool *pool, struct gn_light_list *list);
+                                         struct gn_light_list *list);
 
 #endif

@@ -22,9 +22,10 @@ enum { THRESHOLD };
 
 struct tree {
     const struct gn_grid *grid;
+    struct gn_scratch *scratch;
     int depth;                     // side = 2^depth
     uint32_t start[DEPTH_MAX + 2]; // of each level's nodes, the root first; then their number
-    double *energy;                // by node, owned
+    double *energy;                // by node, of the scratch
     const uint64_t *was_split;     // a bit by node; NULL: not known
     uint64_t *is_split;
     double threshold;
@@ -43,7 +44,7 @@ static int fill_energies(struct tree *t)
         t->depth++;
     for (int l = 0; l <= t->depth; l++)
         t->start[l + 1] = t->start[l] + (1u << 2 * l);
-    t->energy = malloc(t->start[t->depth + 1] * sizeof(*t->energy));
+    t->energy = gn_scratch_take(t->scratch, t->start[t->depth + 1], sizeof(*t->energy));
     if (!t->energy)
         return -ENOMEM;
     double *leaves = t->energy + t->start[t->depth];
@@ -167,10 +168,6 @@ int gn_quadtree_make_lights(const struct gn_light_input *input, struct gn_light_
     (void)figures;
     struct gn_grid grid;
     int rc = gn_grid_init(&grid, input);
-    struct tree tree = {.grid = &grid, .list = list};
-    if (rc == 0)
-        rc = make_leaves(&tree, input);
-    free(tree.energy);
-    gn_grid_finish(&grid);
-    return rc;
+    struct tree tree = {.grid = &grid, .scratch = input->scratch, .list = list};
+    return rc < 0 ? rc : make_leaves(&tree, input);
 }

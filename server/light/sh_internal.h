@@ -6,6 +6,7 @@
 
 #include <string.h>
 
+#include "server/light/scratch.h"
 #include "server/light/sh.h"
 #include "server/light/vec4.h"
 
@@ -56,8 +57,8 @@ struct gn_sh_sums {
     double p[GN_SH_MAX][3];
 };
 
-/** The columns' waves of a lat-long of that width: malloc'ed, or NULL. */
-GN_MUST_USE float *gn_sh_make_columns(int width, int order);
+/** The columns' waves of a lat-long of that width, of the scratch. NULL: no memory. */
+GN_MUST_USE float *gn_sh_make_columns(int width, int order, struct gn_scratch *scratch);
 /** Adds row y of a lat-long. */
 void gn_sh_add_latlong_row(const struct gn_image *image, int y, int order, const float *columns,
                            struct gn_sh_sums *sums);

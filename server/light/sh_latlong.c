@@ -6,7 +6,6 @@
  */
 #include <math.h>
 #include <stdbool.h>
-#include <stdlib.h>
 
 #include "server/light/sh_internal.h"
 
@@ -28,12 +27,12 @@ static bool is_folded(int width)
     return width % 16 == 0;
 }
 
-float *gn_sh_make_columns(int width, int order)
+float *gn_sh_make_columns(int width, int order, struct gn_scratch *scratch)
 {
     bool is_short = is_folded(width);
     int n = is_short ? width / 4 : width, repeat = is_short ? 3 : 1;
     size_t stride = (size_t)repeat * (size_t)n;
-    float *columns = malloc((size_t)(2 * order) * stride * sizeof(*columns));
+    float *columns = gn_scratch_take(scratch, (size_t)(2 * order) * stride, sizeof(*columns));
     for (int x = 0; columns && x < n; x++) {
         double phi = pi - 2 * pi * (x + 0.5) / width, c1 = cos(phi), s1 = sin(phi), c = c1, s = s1;
         for (int m = 1; m <= order; m++) {

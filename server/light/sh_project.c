@@ -6,7 +6,6 @@
  * tests/unit/sh.c measures. All is added in one order whatever the pool's size.
  */
 #include <errno.h>
-#include <stdlib.h>
 
 #include "server/light/map_table.h"
 #include "server/light/sh_internal.h"
@@ -155,9 +154,12 @@ int gn_sh_project_map(const struct gn_radiance_map *map, int order, struct gn_po
     int n_items = (map->radiance.height + ROWS_PER_ITEM - 1) / ROWS_PER_ITEM, rc = -ENOMEM;
     bool is_latlong = map->projection.type == GN_PROJECTION_LATLONG;
     struct projection_work work = {.map = map, .order = order};
-    work.items = malloc((size_t)n_items * sizeof(*work.items));
+    struct gn_scratch *scratch = gn_scratch_borrow(&map->table->scratch);
+    if (!scratch)
+        return -ENOMEM;
+    work.items = gn_scratch_take(scratch, (size_t)n_items, sizeof(*work.items));
     if (is_latlong)
-        work.columns = gn_sh_make_columns(map->radiance.width, order);
+        work.columns = gn_sh_make_columns(map->radiance.width, order, scratch);
     if (!work.items || (is_latlong && !work.columns))
         goto out;
     gn_pool_run(pool, n_items, project_item, &work);
@@ -175,7 +177,6 @@ int gn_sh_project_map(const struct gn_radiance_map *map, int order, struct gn_po
     gn_sh_rotate(order, map->table->world_from_probe, out_sh);
     rc = 0;
 out:
-    free(work.columns);
-    free(work.items);
+    gn_scratch_give_back(&map->table->scratch, &scratch);
     return rc;
 }

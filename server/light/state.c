@@ -32,17 +32,15 @@ static int compare_ranked(const void *a, const void *b)
     return la->place < lb->place ? -1 : la->place > lb->place;
 }
 
-/* Moves the list's lights into the state, by falling luminance, the weakest beyond the bound left
+/* Copies the list's lights into the state, by falling luminance, the weakest beyond the bound left
  * out. */
 static int take_lights(struct gn_lighting_state *state, const struct gn_light_list *list)
 {
-    struct ranked_light *ranked = malloc((size_t)list->n * sizeof(*ranked) + 1);
+    struct ranked_light *ranked = gn_scratch_take(list->scratch, (size_t)list->n, sizeof(*ranked));
     int n = list->n < GN_LIGHTS_MAX ? list->n : GN_LIGHTS_MAX;
     state->lights = malloc((size_t)n * sizeof(*state->lights) + 1);
-    if (!ranked || !state->lights) {
-        free(ranked);
+    if (!ranked || !state->lights)
         return -ENOMEM;
-    }
     for (int i = 0; i < list->n; i++)
         ranked[i] =
             (struct ranked_light){list->lights[i], gn_luminance(list->lights[i].irradiance), i};
@@ -51,7 +49,6 @@ static int take_lights(struct gn_lighting_state *state, const struct gn_light_li
         state->lights[i] = ranked[i].light;
     state->n_lights = n;
     state->figures.n_dropped = list->n - n;
-    free(ranked);
     return 0;
 }
 
@@ -105,14 +102,10 @@ static int make_from_rest(struct gn_lighting_state *state, struct gn_light_setti
                                          .previous = previous,
                                          .remembered = recall(state, previous),
                                          .memory = state->memory,
-                                         .scratch = gn_scratch_borrow(&state->map->table->scratch),
+                                         .scratch = list->scratch,
                                          .pool = pool};
     if (rc == 0)
-        rc = input.scratch
-                 ? gn_light_maker_get(settings->method)->make(&input, list, &state->figures)
-                 : -ENOMEM;
-    struct gn_scratch *scratch = input.scratch;
-    gn_scratch_give_back(&state->map->table->scratch, &scratch);
+        rc = gn_light_maker_get(settings->method)->make(&input, list, &state->figures);
     gn_radiance_map_unref(&rest);
     return rc;
 }
@@ -130,7 +123,9 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     if (rc < 0)
         return rc;
     int64_t start_ns = gn_clock_get_monotonic_ns();
-    struct gn_light_list list = {0};
+    gn_scratch_place *place = &state->map->table->scratch;
+    struct gn_scratch *scratch = gn_scratch_borrow(place);
+    struct gn_light_list list = {.scratch = scratch};
     // Another stream's tables serve, but its lights and decisions are none of this one's.
     bool goes_on = options->previous && options->previous->stream == options->stream;
     gn_partition_plan_unref(&state->plan);
@@ -138,7 +133,7 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
     free(state->lights);
     state->lights = NULL;
     state->memory = calloc(1, sizeof(*state->memory));
-    rc = state->memory ? 0 : -ENOMEM;
+    rc = state->memory && scratch ? 0 : -ENOMEM;
     if (rc == 0)
         rc = gn_partition_plan_create(state->map, &settings.division,
                                       options->previous ? options->previous->plan : NULL,
@@ -151,7 +146,7 @@ static int make_lights(struct gn_lighting_state *state, const struct gn_light_op
         rc = take_lights(state, &list);
     if (rc == 0)
         place_lights(state);
-    gn_light_list_finish(&list);
+    gn_scratch_give_back(place, &scratch);
     state->has_lights = true;
     state->ms_lights = to_ms(gn_clock_get_monotonic_ns() - start_ns);
     return rc < 0 ? gn_error_set(out_error, rc, "lights: no memory") : 0;

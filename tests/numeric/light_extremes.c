@@ -10,6 +10,7 @@
 #include "common/pool.h"
 #include "server/light/luminance.h"
 #include "server/light/map_samples.h"
+#include "server/light/map_table.h"
 #include "server/light/sh.h"
 #include "server/light/state.h"
 #include "tests/light_states.h"
@@ -232,9 +233,10 @@ static void trap_5_poles_get_no_more_samples(void **unused)
     assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 512, 256), 0);
     light_fixture_fill(&f, light_fixture_constant);
     assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), 0);
+    struct gn_scratch *scratch = gn_scratch_borrow(&map->table->scratch);
     struct gn_map_samples samples = {0};
     const struct gn_map_sampling sampling = {.n_wanted = 4000};
-    assert_int_equal(gn_map_samples_draw(map, &sampling, &samples), 0);
+    assert_int_equal(gn_map_samples_draw(map, &sampling, scratch, &samples), 0);
     enum { N_BINS = 20 }; // of equal height: of equal solid angle
     int bins[N_BINS] = {0};
     for (int i = 0; i < samples.n; i++) {
@@ -245,7 +247,7 @@ static void trap_5_poles_get_no_more_samples(void **unused)
     double mean = (double)samples.n / N_BINS;
     for (int i = 0; i < N_BINS; i++) // both pole caps among them
         assert_true(fabs(bins[i] - mean) < 3 * sqrt(mean));
-    gn_map_samples_finish(&samples);
+    gn_scratch_give_back(&map->table->scratch, &scratch);
     gn_radiance_map_unref(&map);
     light_fixture_finish(&f);
 }

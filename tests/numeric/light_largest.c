@@ -9,6 +9,7 @@
 #include "proto/attr.h"
 #include "server/light/luminance.h"
 #include "server/light/map_samples.h"
+#include "server/light/map_table.h"
 #include "server/light/state.h"
 #include "tests/light_fixture.h"
 #include "tests/unit/cmocka_setup.h"
@@ -128,7 +129,8 @@ static void trap_6_samples_do_not_have_their_density(void **unused)
         assert_int_equal(light_fixture_init(&f, maps[t].type, maps[t].width, maps[t].height), 0);
         light_fixture_fill(&f, slope);
         assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, NULL), 0);
-        assert_int_equal(gn_map_samples_draw(map, &sampling, &samples), 0);
+        struct gn_scratch *scratch = gn_scratch_borrow(&map->table->scratch);
+        assert_int_equal(gn_map_samples_draw(map, &sampling, scratch, &samples), 0);
         double whole = 0, worst = 0;
         for (int i = 0; i < map->radiance.width * map->radiance.height; i++)
             whole += gn_luminance(map->radiance.data + 3 * i) * (double)map->solid_angle[i];
@@ -153,7 +155,7 @@ static void trap_6_samples_do_not_have_their_density(void **unused)
             gn_projection_get_name(maps[t].type), samples.n, norm, worst);
         assert_near(norm, 1, 0.01);
         assert_true(worst < 0.02);
-        gn_map_samples_finish(&samples);
+        gn_scratch_give_back(&map->table->scratch, &scratch);
         gn_radiance_map_unref(&map);
         light_fixture_finish(&f);
     }

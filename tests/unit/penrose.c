@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "server/light/map_samples.h"
+#include "server/light/map_table.h"
 #include "server/light/penrose.h"
 #include "tests/light_fixture.h"
 
@@ -303,10 +304,11 @@ static void a_hot_texel_gets_its_share(void **unused)
     for (int c = 0; c < 3; c++)
         gn_image_at(&f.image, 300, 100)[c] = (float)(2 * acos(-1) / w);
     assert_int_equal(gn_radiance_map_create(&f.frame, NULL, NULL, &map, &error), 0);
-    struct gn_map_samples samples = {0};
     for (int is_relaxed = 0; is_relaxed < 2; is_relaxed++) {
+        struct gn_scratch *scratch = gn_scratch_borrow(&map->table->scratch);
+        struct gn_map_samples samples = {0};
         struct gn_map_sampling sampling = {.n_wanted = 2000, .is_relaxed = is_relaxed > 0};
-        assert_int_equal(gn_map_samples_draw(map, &sampling, &samples), 0);
+        assert_int_equal(gn_map_samples_draw(map, &sampling, scratch, &samples), 0);
         int n_hot = 0;
         for (int i = 0; i < samples.n; i++) {
             n_hot += samples.texel[i] == 100 * 1024 + 300;
@@ -314,7 +316,7 @@ static void a_hot_texel_gets_its_share(void **unused)
         }
         assert_near((double)n_hot / samples.n, 0.5, 0.01);
         assert_near(samples.n, 2000, 120);
-        gn_map_samples_finish(&samples);
+        gn_scratch_give_back(&map->table->scratch, &scratch);
     }
     gn_radiance_map_unref(&map);
     light_fixture_finish(&f);

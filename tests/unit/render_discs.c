@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "server/light/discs.h"
+#include "server/light/map_table.h"
 #include "tests/meshes.h"
 #include "tests/stage.h"
 
@@ -62,6 +63,8 @@ static void test_a_disc_has_the_suns_penumbra(void **state)
     struct gn_light_list list = {0};
     struct gn_radiance_map *rest = NULL;
     init_stage(&stage);
+    list.scratch = gn_scratch_borrow(&stage.map->table->scratch);
+    assert_non_null(list.scratch);
     assert_int_equal(gn_discs_take(stage.map, NULL, NULL, &list, &rest), 0);
     assert_int_equal(list.n, 1);
     assert_true(list.lights[0].is_disc);
@@ -86,7 +89,7 @@ static void test_a_disc_has_the_suns_penumbra(void **state)
                   disc, n_directions, point);
     assert_true(disc < 0.04 && point > 5 * disc);
     gn_layers_finish(&reference);
-    gn_light_list_finish(&list);
+    gn_scratch_give_back(&stage.map->table->scratch, &list.scratch);
     gn_radiance_map_unref(&rest);
     gn_test_stage_finish(&stage);
 }
