@@ -21,7 +21,7 @@
 #include "tests/rig/vec.h"
 
 /* Changes whenever the same options give other pictures. */
-#define RECIPE "gnomon-rig 1"
+#define RECIPE "gnomon-rig 2"
 #define BATCHES 4
 #define MAP_WIDTH 1024
 #define PATH_MAX_BYTES 4096
