@@ -260,8 +260,6 @@ struct tile_figures {
     uint64_t rays_primary, rays_mirror, rays_shade, rays_shadow;
     uint64_t n_mirrors, n_glossy, n_lit, n_receivers, n_rays_real;
     uint64_t n_near; // near lights that reach a sample
-    double error_sum;
-    int64_t error_n;
     int64_t n_virtual_pixels, n_shadow_pixels, n_refined_pixels;
 };
 

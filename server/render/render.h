@@ -40,6 +40,7 @@ struct gn_render_options {
     bool shadow_ignore_real; // real blockers do not count in the sums (SEED implies it)
     bool all_passes;         // switch every omission of the plan off (for tests)
     bool single_ray;         // no pixel gets a grid (to compare light alone)
+    bool estimate_error;     // the report's estimated_error: takes about 150 000 more rays
     bool supersample_all;    // every pixel gets its quality's grid (to test the choice of them)
     int bounces;             // reference only: indirect bounces, [0, 16]
     int paths_per_pixel;     // reference with bounces: random paths, [1, 65536], default 256
@@ -92,14 +93,16 @@ struct gn_render_report {
     struct gn_plan_entry plan[GN_PLAN_MAX];
     double ms_plan, ms_total;               // wall time
     double ms_primary, ms_shade, ms_shadow; // the workers' time in the pass / number of workers
+    double ms_estimate;                     // wall time of estimated_error
     uint64_t rays_primary, rays_mirror;     // nearest-hit rays: through pixels, after mirrors
     uint64_t rays_shade, rays_shadow;       // visibility rays (and, with bounces, path segments)
+    uint64_t rays_estimate;                 // all rays of estimated_error
     int n_lights;                           // lights used; reference: directions of the map used
     /**
-     * Of the shadow factor, RMS over the affected pixels and channels; < 0: not known. Half the
-     * difference between the factors that the even and the odd lights give: as rough as that is:
-     * 3 to 5 times the true error for lights that each stand for a cell of the map, whose halves
-     * differ by more than samples would (tests/unit/render_reference.c prints both).
+     * Of the shadow factor against the reference's, RMS over the affected pixels and channels, one
+     * ray a pixel (grids at edges make a coarse picture better than that); < 0: not known or not
+     * asked for. From rays of its own at about 500 pixels (estimate.h); tests/bench/error_time says
+     * how near it is.
      */
     double estimated_error;
     int64_t n_virtual_pixels, n_shadow_pixels; // pixels with coverage > 0, with a factor < 1

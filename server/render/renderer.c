@@ -11,6 +11,7 @@
 
 #include "common/clock.h"
 #include "server/render/kernels/kernels.h"
+#include "server/render/estimate.h"
 #include "server/render/silhouette.h"
 
 #define DEFAULT_PATHS 256
@@ -37,6 +38,7 @@ struct gn_renderer {
     struct box wide_blockers[MAX_BLOCKERS];
     struct clusters clusters[2]; // real, virtual
     struct silhouettes silhouettes[2];
+    struct estimate *estimate; // owned
 };
 
 int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
@@ -59,6 +61,12 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
                             pool ? gn_pool_get_size(pool) : 1);
     }
     memset(renderer->scratches, 0, bytes);
+    renderer->estimate = aligned_alloc(_Alignof(struct estimate), sizeof(*renderer->estimate));
+    if (!renderer->estimate) {
+        gn_renderer_destroy(&renderer);
+        return gn_error_set(out_error, -ENOMEM, "renderer: no memory for its error's estimate");
+    }
+    memset(renderer->estimate, 0, sizeof(*renderer->estimate));
     if (gn_blockers_make(scene, &renderer->blockers) < 0 ||
         gn_clusters_make(scene, GN_RT_REAL, &renderer->clusters[0]) < 0 ||
         gn_clusters_make(scene, GN_RT_VIRTUAL, &renderer->clusters[1]) < 0) {
@@ -80,6 +88,9 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
         free(self->scratches[i].cut_places);
     }
     free(self->scratches);
+    if (self->estimate)
+        gn_estimate_finish(self->estimate);
+    free(self->estimate);
     for (int i = 0; i < 2; i++) {
         gn_clusters_finish(&self->clusters[i]);
         gn_silhouettes_finish(&self->silhouettes[i]);
@@ -382,6 +393,9 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
 
     gn_tiles_render(&frame, renderer->pool);
     gn_report_fill(&frame, renderer->n_workers, &report);
+    ret = gn_estimate_make(renderer->estimate, &frame, renderer->pool, &report);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
     report.ms_total = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
     *out_report = report;
     return 0;

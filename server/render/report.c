@@ -2,7 +2,6 @@
 /* SPDX-License-Identifier: ISC */
 #include "server/render/internal.h"
 
-#include <math.h>
 #include <string.h>
 
 static void sum_figures(const struct frame *frame, struct tile_figures *sum)
@@ -23,8 +22,6 @@ static void sum_figures(const struct frame *frame, struct tile_figures *sum)
         sum->n_lit += f->n_lit;
         sum->n_receivers += f->n_receivers;
         sum->n_rays_real += f->n_rays_real;
-        sum->error_sum += f->error_sum;
-        sum->error_n += f->error_n;
         sum->n_virtual_pixels += f->n_virtual_pixels;
         sum->n_shadow_pixels += f->n_shadow_pixels;
         sum->n_refined_pixels += f->n_refined_pixels;
@@ -47,9 +44,4 @@ void gn_report_fill(const struct frame *frame, int n_workers, struct gn_render_r
     report->n_virtual_pixels = sum.n_virtual_pixels;
     report->n_shadow_pixels = sum.n_shadow_pixels;
     report->n_refined_pixels = sum.n_refined_pixels;
-    // The reference's directions are cells of a map, not samples of it: halves say nothing.
-    bool is_known = frame->options.quality != GN_QUALITY_REFERENCE && frame->run_shadow;
-    report->estimated_error = !is_known         ? -1
-                              : sum.error_n > 0 ? sqrt(sum.error_sum / (double)sum.error_n)
-                                                : 0;
 }

@@ -50,25 +50,11 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
     figures->s_shadow += 1e-9 * (double)(t3 - t2);
 }
 
-/** The paper's ratio of one half of the lights, or of both (half 2). */
-static double get_factor(const struct frame *frame, const struct sample *s, int half, int k)
+/** The paper's ratio. */
+static double get_factor(const struct frame *frame, const struct sample *s, int k)
 {
-    double open = half == 2 ? s->open[0][k] + s->open[1][k] : s->open[half][k];
-    double cut = half == 2 ? s->cut[0][k] + s->cut[1][k] : s->cut[half][k];
+    double open = s->open[0][k] + s->open[1][k], cut = s->cut[0][k] + s->cut[1][k];
     return open > frame->floor_irradiance[k] ? 1 - cut / open : 1;
-}
-
-/** Half the difference of the halves has the variance of the whole, where lights are samples. */
-static void estimate_error(const struct frame *frame, const struct sample *s,
-                           struct tile_figures *figures)
-{
-    if (!s->is_cut)
-        return;
-    for (int k = 0; k < 3; k++) {
-        double e = 0.5 * (get_factor(frame, s, 0, k) - get_factor(frame, s, 1, k));
-        figures->error_sum += e * e;
-    }
-    figures->error_n += 3;
 }
 
 /** What the choice of pixels to refine looks at; without bounces, which are noisy. */
@@ -80,7 +66,7 @@ static void keep_feature(const struct frame *frame, int x, int y, const struct s
     feature->owner = is_virtual ? s->object + 1 : 0;
     for (int k = 0; k < 3; k++)
         feature->color[k] = (float)(is_virtual  ? s->radiance[k] - s->indirect[k]
-                                    : s->is_cut ? get_factor(frame, s, 2, k)
+                                    : s->is_cut ? get_factor(frame, s, k)
                                                 : 1);
 }
 
@@ -125,8 +111,6 @@ static void render_centres(void *context, int item, int worker)
         *gn_image_at(&frame->layers->depth, x, y) = s->depth;
         gn_layers_resolve(frame, x, y, s, 1);
         keep_feature(frame, x, y, s);
-        if (frame->run_shadow)
-            estimate_error(frame, s, figures);
     }
 }
 

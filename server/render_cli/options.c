@@ -91,6 +91,7 @@ static void read_numbers(struct gn_cli_request *request)
     struct gn_render_options *render = &request->render;
     render->quality = (enum gn_quality)get_enum(request, "quality");
     render->shading = (enum gn_shading)get_enum(request, "shading");
+    render->estimate_error = true;
     render->bounces = get_int(request, "bounces");
     render->seed = (uint64_t)get_int(request, "seed");
     if (is_set(request, "paths"))

@@ -13,6 +13,9 @@
 #include "server/room/buf_pool.h"
 #include "server/scene/motion.h"
 
+/** One frame in so many says its error: that takes time. */
+enum { ESTIMATE_EVERY = 16 };
+
 /** The buffers of one picture size. */
 struct frame_buffers {
     int width, height; // 0: not used yet
@@ -219,6 +222,7 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     struct gn_render_options options = m->options->render;
     options.quality = (enum gn_quality)w->job->frame.quality;
     options.seed = w->job->frame.id;
+    options.estimate_error = m->n_frames % ESTIMATE_EVERY == 1; // the first frame is 1
     struct gn_render_report report = {0};
     int rc =
         gn_renderer_render(m->renderer, camera, w->light, &options, &b->layers, &report, error);

@@ -298,8 +298,8 @@ static void test_threads_change_no_bit(void **state)
 {
     (void)state;
     const struct gn_render_options options[4] = {
-        {.quality = GN_QUALITY_INTERACTIVE},
-        {.quality = GN_QUALITY_SEED},
+        {.quality = GN_QUALITY_INTERACTIVE, .estimate_error = true},
+        {.quality = GN_QUALITY_SEED, .estimate_error = true},
         {.quality = GN_QUALITY_REFERENCE},
         {.quality = GN_QUALITY_REFERENCE, .bounces = 2, .paths_per_pixel = 8, .seed = 5},
     };

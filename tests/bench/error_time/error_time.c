@@ -151,6 +151,11 @@ static struct timing render(const struct bench *b, struct gn_bench_scene *scene,
               "a frame of", scene->name);
         stop(&watch);
     }
+    const struct gn_render_options with_estimate = {
+        .quality = quality, .single_ray = true, .estimate_error = true};
+    check(gn_renderer_render(stage->renderer, &stage->camera, state, &with_estimate, &stage->layers,
+                             &stage->report, NULL),
+          "a frame of", scene->name);
     return sum_up(&watch);
 }
 
@@ -176,12 +181,14 @@ static void measure_setting(struct bench *b, const struct gn_bench_map *map,
         check(gn_bench_measure_errors(&references[i], &scene->stage.layers, true, &e),
               "the errors of", scene->name);
         b->n_too_near[i] += e.rmse < 10 * b->self_error[i];
-        fprintf(b->errors,
-                "%s,%s,%s,%s,%d,%d,%.4f,%.4f,%.4f,%.4f,%llu,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%ld\n",
-                scene->name, map->name, s->method, s->params, s->asked, state->n_lights,
-                light.median, light.range, frame.median, frame.range,
-                (unsigned long long)count_rays(&scene->stage.report), e.rmse, e.bias, e.relmse,
-                e.relmse_trimmed, gn_bench_compare_irradiance(state, exact), e.flip, e.n_masked);
+        fprintf(
+            b->errors,
+            "%s,%s,%s,%s,%d,%d,%.4f,%.4f,%.4f,%.4f,%llu,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%ld,%.6g\n",
+            scene->name, map->name, s->method, s->params, s->asked, state->n_lights, light.median,
+            light.range, frame.median, frame.range,
+            (unsigned long long)count_rays(&scene->stage.report), e.rmse, e.bias, e.relmse,
+            e.relmse_trimmed, gn_bench_compare_irradiance(state, exact), e.flip, e.n_masked,
+            scene->stage.report.estimated_error);
     }
     gn_lighting_state_unref(&state);
 }
@@ -364,9 +371,10 @@ static void write_run(const struct bench *b)
 
 static void run(struct bench *b)
 {
-    b->errors = open_table(b, "error.csv",
-                           "scene,map,method,params,asked,lights,ms_light,iqr_light,ms_frame,"
-                           "iqr_frame,rays,rmse,bias,relmse,relmse_trimmed,irradiance,flip,masked");
+    b->errors = open_table(
+        b, "error.csv",
+        "scene,map,method,params,asked,lights,ms_light,iqr_light,ms_frame,"
+        "iqr_frame,rays,rmse,bias,relmse,relmse_trimmed,irradiance,flip,masked,estimated");
     b->irradiance = open_table(b, "irradiance.csv", "map,harmonics,ms,irradiance");
     b->stream = open_table(b, "stream.csv",
                            "method,params,lights,smoothing,flicker,noise_codes,response_frames");

@@ -10,13 +10,16 @@ not looked at, nor is the references' own error: a quick reference has whole tex
 see a figure change and not enough to say how far from the truth it is.
 --update writes the table anew; say why in the commit.
 """
+import bisect
 import csv
 import os
+import statistics
 import subprocess
 import sys
 
 import tables
 
+LEAST_RANK, LEAST_NEAR = 0.9, 0.9  # of the estimated errors: rank correlation, share within 2 times
 GROWTH = 1.03
 SLACK = 1e-5  # differences up to this are nothing
 # What is looked at: table, its key columns, its figures, for all of which less is better.
@@ -36,6 +39,22 @@ def collect(folder):
             for figure in figures:
                 found[name.removesuffix(".csv"), key, figure] = row[figure]
     return found
+
+
+def get_ranks(values):
+    """Mean ranks, ties shared."""
+    order = sorted(values)
+    return [(bisect.bisect_left(order, v) + bisect.bisect_right(order, v)) / 2 for v in values]
+
+
+def judge_estimates(folder):
+    """(Spearman's rank correlation, share within a factor of 2, pictures, unknown) of the renderer's
+    estimated error beside the measured one."""
+    rows = [r for r in tables.read(folder, "error.csv") if r["masked"]]
+    known = [(r["rmse"], r["estimated"]) for r in rows if r["estimated"] >= 0]
+    rank = statistics.correlation(*(get_ranks(v) for v in zip(*known)))
+    near = sum(e / 2 <= t <= 2 * e for t, e in known) / len(known)
+    return rank, near, len(rows), len(rows) - len(known)
 
 
 def load(path):
@@ -67,7 +86,7 @@ def main():
         return
     expected = load(expected_path)
     groups = list(dict.fromkeys((k[0], k[2]) for k in list(expected) + list(found)))
-    print(f"1..{len(groups) + 1}")
+    print(f"1..{len(groups) + 2}")
     print("# quick references, their own error not estimated: changes are found, no errors vouched for")
     for n, (table, figure) in enumerate(groups, 1):
         bad, better = [], 0
@@ -90,6 +109,11 @@ def main():
     for key in new[:20]:
         print(f"# not in the table: {key}")
     print(f"{'not ok' if new else 'ok'} {len(groups) + 1} - all that is measured is in the table")
+    rank, near, n_all, n_unknown = judge_estimates(out)
+    print(f"# estimated error over {n_all} pictures: rank correlation {rank:.3f}, within a factor of 2 "
+          f"in {100 * near:.0f} %, unknown in {n_unknown}")
+    good = rank > LEAST_RANK and near >= LEAST_NEAR and 10 * n_unknown <= n_all
+    print(f"{'ok' if good else 'not ok'} {len(groups) + 2} - the estimated error is true")
 
 
 main()
