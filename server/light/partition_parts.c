@@ -187,14 +187,13 @@ static void split_region(void *context, int r, int worker)
                     &sink);
 }
 
-/* Most items of a region: its runs, and the texels of those that are too large for one. */
+/* Most items of a region: its runs, and the texels of those that are too large for one. Not the
+ * texels with light: what vanishes in the run sums' floats is an item all the same. */
 static size_t count_items(const struct gn_region *region)
 {
     uint64_t n = FINENESS * (uint64_t)region->n_parts; // so many hold so much
     n = n < region->n_runs ? n : region->n_runs;
-    n = region->n_runs + (GN_REGION_RUN_MAX - 1) * n;
-    uint64_t n_lit = (uint64_t)region->patch.n_lit;
-    return (size_t)(n < n_lit ? n : n_lit);
+    return (size_t)(region->n_runs + (GN_REGION_RUN_MAX - 1) * n);
 }
 
 int gn_partition_split_regions(struct gn_partition *p)

@@ -117,6 +117,28 @@ static void trap_1_a_sun_of_1e9(void **unused)
     }
 }
 
+/* What is lit in double but vanishes in the units of the brightest: 48 decades below. */
+static void trap_7_light_below_the_range_of_floats(void **unused)
+{
+    (void)unused;
+    const struct gn_light_options options = {.n_lights = 4096, .rings = 4, .sectors = 8};
+    struct gn_pool *pool = NULL;
+    struct light_fixture f;
+    assert_int_equal(gn_pool_create(4, &pool), 0);
+    assert_int_equal(light_fixture_init(&f, GN_PROJECTION_LATLONG, 2048, 1024), 0);
+    light_fixture_fill(&f, light_fixture_constant);
+    for (int i = 0; i < 3 * 2048 * 1024; i++)
+        f.image.data[i] = i / 3 % 547 == 0 ? 1e30f : 1e-18f;
+    struct gn_lighting_state *one = make_state(&f, &options, NULL);
+    struct gn_lighting_state *many = make_state(&f, &options, pool);
+    check_finite(one, &options);
+    assert_same_lights(many, one);
+    gn_lighting_state_unref(&one);
+    gn_lighting_state_unref(&many);
+    light_fixture_finish(&f);
+    gn_pool_destroy(&pool);
+}
+
 static void trap_2_nan_inf_negative(void **unused)
 {
     (void)unused;
@@ -382,6 +404,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(trap_1_a_sun_of_1e9),
+        cmocka_unit_test(trap_7_light_below_the_range_of_floats),
         cmocka_unit_test(trap_2_nan_inf_negative),
         cmocka_unit_test(trap_3_all_black),
         cmocka_unit_test(trap_4_one_texel_of_99_percent),
