@@ -364,8 +364,8 @@ def list_bad():
     yield 'objects', [], scene_with(objects=[])
     yield 'lights', [], scene_with(lights=[{'type': 'point'}])
     yield 'gone.obj', [], scene_with(objects=[{'mesh': 'gone.obj', 'role': 'real'}])
-    yield 'diffuse and mirror are', [], scene_with(
-        objects=[{'mesh': 'box.obj', 'role': 'virtual', 'material': {'type': 'glass'}}])
+    yield "'glass', 'ggx', found", [], scene_with(
+        objects=[{'mesh': 'box.obj', 'role': 'virtual', 'material': {'type': 'wood'}}])
     yield 'width', [], camera_with(width=0)
     yield 'width', [], camera_with(width=1000000)
     yield 'fx', [], camera_with(fx=-1)

@@ -182,7 +182,8 @@ def test_reasons():
         assert error.code == pb.ERROR_CODE_BAD_VALUE and not error.fatal and '64' in error.sentence
         viewer.send(POSE, pb.Pose(object='cube', world_from_object=DOWN))
         error, _ = viewer.expect(ERROR)
-        assert error.code == pb.ERROR_CODE_UNSUPPORTED and not error.fatal, error
+        assert error.code == pb.ERROR_CODE_BAD_VALUE and not error.fatal, error
+        assert 'movable' in error.sentence
         viewer.expect_result(viewer.send_frame())
 
 
