@@ -2,12 +2,15 @@
 /* SPDX-License-Identifier: ISC */
 #include "server/light/scratch.h"
 
+#include <assert.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { ALIGNMENT = 64, BLOCK_MIN = 1 << 16 };
+/* Bytes; the largest map's pieces are of 1 GiB. */
+#define PIECE_MAX ((size_t)1 << 36)
 
 struct block {
     struct block *below; // owned
@@ -21,10 +24,10 @@ struct gn_scratch {
     size_t last_capacity; // bytes
 };
 
-/* Whole cache lines; SIZE_MAX where no memory has so much. */
+/* Whole cache lines; SIZE_MAX beyond what a piece may have. */
 static size_t get_size(size_t n, size_t item_bytes)
 {
-    if (item_bytes > 0 && n > (SIZE_MAX / 4) / item_bytes)
+    if (item_bytes > 0 && n > PIECE_MAX / item_bytes)
         return SIZE_MAX;
     size_t bytes = n * item_bytes;
     return bytes == 0 ? ALIGNMENT : (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
@@ -122,6 +125,7 @@ void *gn_scratch_take_zeroed(struct gn_scratch *scratch, size_t n, size_t item_b
 void *gn_scratch_grow(struct gn_scratch *scratch, void *piece, size_t n_old, size_t n,
                       size_t item_bytes)
 {
+    assert(n >= n_old);
     size_t bytes = get_size(n, item_bytes);
     struct block *top = scratch->top;
     if (bytes == SIZE_MAX)
