@@ -21,7 +21,8 @@ struct side {
     float ends[6];
     int end[2], apex; // vertices
     int cluster;
-    int mover; // only what moves together stays together
+    int mover;    // only what moves together stays together
+    bool is_flat; // a silhouette may leave out what is
 };
 
 static int compare_sides(const void *a, const void *b)
@@ -32,6 +33,8 @@ static int compare_sides(const void *a, const void *b)
         if (x->ends[i] != y->ends[i])
             return x->ends[i] < y->ends[i] ? -1 : 1;
     }
+    if (x->is_flat != y->is_flat)
+        return x->is_flat ? 1 : -1;
     return (x->mover > y->mover) - (x->mover < y->mover);
 }
 
@@ -71,6 +74,7 @@ static void add_sides(const struct clusters *clusters, int c, struct side **next
         side->apex = vertex[2];
         side->cluster = c;
         side->mover = cluster->mover;
+        side->is_flat = cluster->is_flat;
     }
 }
 

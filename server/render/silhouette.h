@@ -28,9 +28,8 @@ struct silhouette {
 /** A set's silhouettes, one for each light. Kept from frame to frame. */
 struct silhouettes {
     int n, capacity;
-    struct silhouette *of; // [n], owned
-    int n_workers;
-    struct projected *projected; // [n_workers] working memory, owned
+    struct silhouette *of;       // [n], owned
+    struct projected *projected; // [workers of the pool] working memory, owned
 };
 
 /** Whether lines from somewhere meet the set. */

@@ -30,6 +30,8 @@ struct bench {
     struct frame frame; // its kernels
     float size;         // m, of the part of space that is tried
     float at;           // its middle, on each axis
+    bool without_flat;
+    const struct gn_rt *rt; // of what the silhouettes are of
 };
 
 static void add_lights(struct bench *b, uint64_t *seed)
@@ -47,7 +49,7 @@ static void add_lights(struct bench *b, uint64_t *seed)
 
 static void make(struct bench *b)
 {
-    assert_int_equal(gn_silhouettes_make(&b->silhouettes, &b->clusters, false, &b->lights,
+    assert_int_equal(gn_silhouettes_make(&b->silhouettes, &b->clusters, b->without_flat, &b->lights,
                                          b->margin, b->stage.pool),
                      0);
 }
@@ -58,6 +60,7 @@ static void init(struct bench *b, uint64_t *seed)
     gn_test_stage_commit(&b->stage, 2);
     assert_int_equal(gn_clusters_make(b->stage.scene, GN_RT_VIRTUAL, &b->clusters), 0);
     b->frame.kernels = gn_kernels_get();
+    b->rt = b->stage.scene->rt;
     b->margin = 1e-5f * (fabsf(b->at) + b->size);
     add_lights(b, seed);
     make(b);
@@ -77,7 +80,7 @@ static bool meets_line(const struct bench *b, const float p[static 3], const flo
     float org[3];
     for (int k = 0; k < 3; k++)
         org[k] = p[k] - 4 * b->size * dir[k];
-    return gn_rt_is_occluded(b->stage.scene->rt, GN_RT_VIRTUAL, org, dir, 0, INFINITY);
+    return gn_rt_is_occluded(b->rt, GN_RT_VIRTUAL, org, dir, 0, INFINITY);
 }
 
 /** 16 points of a box of random size. */
@@ -154,6 +157,29 @@ static void test_rays_agree(void **state)
     }
 }
 
+/** A tent beside a floor that begins at its edge; the floor is left out. */
+static void test_flat_ones_left_out(void **state)
+{
+    (void)state;
+    uint64_t seed = 17;
+    int n[3] = {0};
+    struct bench tent = {.size = 2};
+    struct bench both = {.size = 2, .without_flat = true};
+    for (int i = 0; i < 2; i++) {
+        struct gn_mesh mesh = gn_test_make_plane(1, 2);
+        mesh.positions[3 * 4 + 2] = 0.7f; // its middle
+        add(i == 0 ? &tent : &both, mesh, 0, 0, 0);
+    }
+    add(&both, gn_test_make_plane(1, 2), 1, 0, 0);
+    init(&tent, &seed);
+    init(&both, &seed);
+    both.rt = tent.rt;
+    check(&both, &seed, n);
+    assert_true(n[SILHOUETTE_DARK] > 20);
+    finish(&both);
+    finish(&tent);
+}
+
 /** The sphere hides pi r^2 of the plane; cells along its edge are few. */
 static void test_most_is_settled(void **state)
 {
@@ -217,6 +243,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rays_agree),
+        cmocka_unit_test(test_flat_ones_left_out),
         cmocka_unit_test(test_most_is_settled),
         cmocka_unit_test(test_kept_is_as_made),
     };
