@@ -61,11 +61,11 @@ struct sample {
     double indirect[3];           // the part of it that came by bounces
 
     // Real: radiance without the virtual objects (B of render.h), what they cut off it (B - C),
-    // what they add (T - C). open and cut: the sums U and S over even and odd lights, W/m^2.
+    // what they add (T - C). open and cut: the sums U and S, W/m^2.
     bool is_receiver; // a diffuse real surface
     bool is_cut;      // some light is cut off by a virtual object
     bool is_summed;   // base and lost are known
-    double open[2][3], cut[2][3];
+    double open[3], cut[3];
     double base[3], lost[3], gain[3];
 };
 
@@ -395,11 +395,11 @@ void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int 
 /** After the last of those. */
 void gn_receivers_flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
                         uint16_t (*masks)[GN_LIGHTS_MAX], uint64_t *rays);
-/** Irradiance by even and odd lights that hidden[n lights] does not mark, and the part of it that
+/** Irradiance by the lights that hidden[n lights] does not mark, and the part of it that
  * cut[n lights] marks. */
 void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, int block,
                       const uint16_t *hidden, const uint16_t *cut, bool unweighted,
-                      double out_open[static 2][3][LANES], double out_cut[static 2][3][LANES]);
+                      double out_open[static 3][LANES], double out_cut[static 3][LANES]);
 
 /* blockers.c */
 

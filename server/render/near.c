@@ -253,18 +253,6 @@ void gn_near_find_hidden(const struct frame *frame, struct scratch *scratch,
     flush_masks(frame, scratch, GN_RT_REAL, scratch->near_hidden, figures);
 }
 
-/** Halves of the sums get pieces by turns; a point is no sample of anything: half of it each. */
-static void add_to_halves(const struct gn_near_light *light, int l, double weight,
-                          double sums[static 2][3])
-{
-    bool is_exact = light->object == GN_NEAR_NO_OBJECT;
-    for (int k = 0; k < 3; k++) {
-        double e = weight * (double)light->intensity[k];
-        sums[l & 1][k] += is_exact ? 0.5 * e : e;
-        sums[~l & 1][k] += is_exact ? 0.5 * e : 0;
-    }
-}
-
 void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile_figures *figures)
 {
     const struct receivers *r = &scratch->receivers;
@@ -284,9 +272,12 @@ void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile
             figures->n_near++;
             double weight = ray.weight * (frame->options.shadow_unweighted ? 1 : cosine) *
                             gn_placed_get_weight(frame, s, l);
-            add_to_halves(light, l, weight, s->open);
-            if (scratch->near_cut[j / LANES][l] & bit)
-                add_to_halves(light, l, weight, s->cut);
+            bool is_cut = scratch->near_cut[j / LANES][l] & bit;
+            for (int k = 0; k < 3; k++) {
+                double e = weight * (double)light->intensity[k];
+                s->open[k] += e;
+                s->cut[k] += is_cut ? e : 0;
+            }
         }
     }
 }

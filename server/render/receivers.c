@@ -92,7 +92,7 @@ void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int 
 
 void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, int block,
                       const uint16_t *hidden, const uint16_t *cut, bool unweighted,
-                      double out_open[static 2][3][LANES], double out_cut[static 2][3][LANES])
+                      double out_open[static 3][LANES], double out_cut[static 3][LANES])
 {
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;

@@ -399,8 +399,8 @@ static void sum_receiver(const struct frame *frame, struct scratch *scratch, str
     figures->n_rays_real += rays;
     if (frame->near.n > 0)
         gn_near_reference_sum(frame, s, frame->options.shadow_unweighted, sums, figures);
-    memcpy(s->open[0], sums[0], sizeof(sums[0]));
-    memcpy(s->cut[0], sums[1], sizeof(sums[1]));
+    memcpy(s->open, sums[0], sizeof(sums[0]));
+    memcpy(s->cut, sums[1], sizeof(sums[1]));
     gn_shadow_weigh(frame, s);
     if (frame->run_bounces)
         add_bounces(frame, s, n_paths, figures);

@@ -237,17 +237,17 @@ static void find_hidden(const struct frame *frame, struct scratch *scratch,
 static void sum_block(const struct frame *frame, struct scratch *scratch, int block)
 {
     const struct receivers *r = &scratch->receivers;
-    double open[2][3][LANES];
-    double cut[2][3][LANES];
+    double open[3][LANES];
+    double cut[3][LANES];
     gn_receivers_sum(frame, scratch, block, scratch->hidden[block], scratch->cut[block],
                      frame->options.shadow_unweighted, open, cut);
     for (int i = 0; i < LANES; i++) {
         if (!(r->wanted[block] >> i & 1))
             continue;
         struct sample *s = &scratch->samples[r->sample[block * LANES + i]];
-        for (int k = 0; k < 6; k++) {
-            s->open[k / 3][k % 3] = open[k / 3][k % 3][i];
-            s->cut[k / 3][k % 3] = cut[k / 3][k % 3][i];
+        for (int k = 0; k < 3; k++) {
+            s->open[k] = open[k][i];
+            s->cut[k] = cut[k][i];
         }
     }
 }
@@ -267,12 +267,10 @@ void gn_shadow_weigh(const struct frame *frame, struct sample *s)
     double emitted[3];
     gn_near_get_emission(frame, &s->surface, emitted);
     for (int k = 0; k < 3; k++) {
-        double u = s->open[0][k] + s->open[1][k];
-        double cut = s->cut[0][k] + s->cut[1][k];
         // The ratio does not know the albedo, so a black one may not make it 0 / 0.
         double brdf = fmax(s->surface.albedo[k], 1e-3) / M_PI;
-        s->base[k] = brdf * u + emitted[k];
-        s->lost[k] = u > frame->floor_irradiance[k] ? brdf * cut : 0;
+        s->base[k] = brdf * s->open[k] + emitted[k];
+        s->lost[k] = s->open[k] > frame->floor_irradiance[k] ? brdf * s->cut[k] : 0;
     }
 }
 

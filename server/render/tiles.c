@@ -53,8 +53,7 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
 /** The paper's ratio. */
 static double get_factor(const struct frame *frame, const struct sample *s, int k)
 {
-    double open = s->open[0][k] + s->open[1][k], cut = s->cut[0][k] + s->cut[1][k];
-    return open > frame->floor_irradiance[k] ? 1 - cut / open : 1;
+    return s->open[k] > frame->floor_irradiance[k] ? 1 - s->cut[k] / s->open[k] : 1;
 }
 
 /** What the choice of pixels to refine looks at; without bounces, which are noisy. */

@@ -51,10 +51,10 @@ struct gn_kernels {
                         float out[static GN_KERNEL_LANES]);
     /** Bit i: that is > 0. */
     unsigned (*get_lit)(const struct gn_kernel_surfaces *surfaces, const float dir[static 3]);
-    /** Irradiance of even and odd lights, per channel: out_open of all that are seen, out_cut of
-     * those of them that are cut. */
-    void (*sum_lights)(const struct gn_kernel_sum *sum, double out_open[static 2][3][16],
-                       double out_cut[static 2][3][16]);
+    /** Irradiance per channel: out_open of all lights that are seen, out_cut of those of them that
+     * are cut. */
+    void (*sum_lights)(const struct gn_kernel_sum *sum, double out_open[static 3][16],
+                       double out_cut[static 3][16]);
     /** Bit i: unless all rays from the origin with a direction of box i surely miss the box. */
     unsigned (*meet)(const struct direction_boxes *boxes, const float min[static 3],
                      const float max[static 3]);

@@ -76,11 +76,11 @@ static void weigh(const struct gn_kernel_sum *sum, int light, const float *weigh
         out[i] *= weights[i];
 }
 
-static void sum_lights(const struct gn_kernel_sum *sum, double out_open[static 2][3][LANES],
-                       double out_cut[static 2][3][LANES])
+static void sum_lights(const struct gn_kernel_sum *sum, double out_open[static 3][LANES],
+                       double out_cut[static 3][LANES])
 {
-    memset(out_open, 0, 6 * LANES * sizeof(double));
-    memset(out_cut, 0, 6 * LANES * sizeof(double));
+    memset(out_open, 0, 3 * LANES * sizeof(double));
+    memset(out_cut, 0, 3 * LANES * sizeof(double));
     for (int l = 0, part = 0; l < sum->n; l++) {
         const float *weights = NULL;
         float w[LANES];
@@ -95,7 +95,7 @@ static void sum_lights(const struct gn_kernel_sum *sum, double out_open[static 2
             wide[i] = w[i];
         for (int k = 0; k < 3; k++) {
             double irradiance = sum->irradiance[k][l];
-            double *to = out_open[l & 1][k];
+            double *to = out_open[k];
             for (int i = 0; i < LANES; i++)
                 to[i] += irradiance * wide[i];
         }
@@ -106,7 +106,7 @@ static void sum_lights(const struct gn_kernel_sum *sum, double out_open[static 2
             wide[i] = cut >> i & 1 ? wide[i] : 0;
         for (int k = 0; k < 3; k++) {
             double irradiance = sum->irradiance[k][l];
-            double *to = out_cut[l & 1][k];
+            double *to = out_cut[k];
             for (int i = 0; i < LANES; i++)
                 to[i] += irradiance * wide[i];
         }
