@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+// Largest texture coordinate: what lies between two of them is finite.
+#define MAX_UV 1e30
+
 void gn_mesh_finish(struct gn_mesh *mesh)
 {
     free(mesh->positions);
@@ -35,11 +38,19 @@ static bool are_finite(const float *values, size_t n)
     return true;
 }
 
+static bool are_uvs(const float uv[static 2])
+{
+    return fabs((double)uv[0]) <= MAX_UV && fabs((double)uv[1]) <= MAX_UV;
+}
+
 static int check_vertices(const struct gn_mesh *mesh, struct gn_error *out_error)
 {
     for (int i = 0; i < mesh->n_vertices; i++) {
         if (!are_finite(mesh->positions + 3 * (size_t)i, 3))
             return gn_error_set(out_error, -EINVAL, "vertex %d is not finite", i);
+        if (mesh->uvs && !are_uvs(mesh->uvs + 2 * (size_t)i))
+            return gn_error_set(out_error, -EINVAL,
+                                "texture coordinates %d are not finite or beyond %g", i, MAX_UV);
         if (!mesh->normals)
             continue;
         const float *n = mesh->normals + 3 * (size_t)i;

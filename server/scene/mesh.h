@@ -28,7 +28,7 @@ struct gn_mesh {
     int n_triangles;
     float *positions;    // [n_vertices][3], finite
     float *normals;      // [n_vertices][3], unit; may be NULL: flat
-    float *uvs;          // [n_vertices][2], v upwards, as the file has them; may be NULL: none
+    float *uvs;          // [n_vertices][2], v upwards, within 1e30; may be NULL: none
     uint32_t *triangles; // [n_triangles][3], each < n_vertices; counter-clockwise seen from outside
     float *albedos;      // [n_triangles][3], [0, 1]; may be NULL: the object's material
     // Of a glTF file; the object's own material comes before them, they before albedos.

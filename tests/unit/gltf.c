@@ -305,6 +305,33 @@ static void test_hostile_files_are_refused(void **state)
     }
 }
 
+static void test_texture_coordinates_are_finite(void **state)
+{
+    (void)state;
+    static const float bad[] = {NAN, INFINITY, -3e38f};
+    const uint8_t color[3] = {255, 255, 255};
+    write_picture("color.png", color, color);
+    for (size_t i = 0; i < LENGTH(bad); i++) {
+        struct gn_mesh mesh = {0};
+        struct gn_error error;
+        assert_int_equal(
+            read_quad("\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":"
+                      "0}}}],\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"color.png\"}]",
+                      &mesh, &error),
+            0);
+        gn_mesh_finish(&mesh);
+        FILE *bin = fopen(gn_test_folder_get_path("q.bin"), "r+b");
+        assert_non_null(bin);
+        assert_int_equal(fseek(bin, 96, SEEK_SET), 0);
+        assert_int_equal(fwrite(&bad[i], sizeof(bad[i]), 1, bin), 1);
+        assert_int_equal(fclose(bin), 0);
+        assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("q.gltf"), &mesh, &error),
+                         -EINVAL);
+        assert_null(mesh.positions);
+        assert_non_null(strstr(error.text, "texture coordinates"));
+    }
+}
+
 /** Reads all glTF files under the folder; counts those that are read. */
 static void read_folder(const char *folder, int *n_read, int *n_refused)
 {
@@ -361,6 +388,7 @@ int main(void)
         cmocka_unit_test(test_rays_pass_where_alpha_is_low),
         cmocka_unit_test(test_what_is_not_done_is_named),
         cmocka_unit_test(test_hostile_files_are_refused),
+        cmocka_unit_test(test_texture_coordinates_are_finite),
         real_data_has(DATA_MODELS) || access(PACKAGE_MODELS, R_OK) == 0
             ? (struct CMUnitTest)cmocka_unit_test(test_debian_models)
             : (struct CMUnitTest){"test_debian_models # SKIP no package assimp-testmodels",
