@@ -34,6 +34,7 @@
 /** Directions of a group: 16 blocks of 16. */
 #define GROUP (LANES * LANES)
 
+struct optics;
 struct silhouette;
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
@@ -67,6 +68,7 @@ struct sample {
     bool is_summed;   // base and lost are known
     double open[3], cut[3];
     double base[3], lost[3], gain[3];
+    uint32_t shown; // 1 + the virtual object that a real mirror or glass shows here; 0: none
 };
 
 /** A box for conservative tests, m; or of directions. */
@@ -250,6 +252,7 @@ struct scratch {
     uint8_t *cut_places, *hidden_places; // [n_places] the same for the places; 0 or 1
     int n_places;
     struct seen_cluster near[2 * MAX_CLUSTERS]; // those above the sample's horizon
+    struct optics *optics; // NULL: no real mirror or glass shows virtual objects
     struct outline outlines[MAX_OUTLINES];
     struct change changes[MAX_OUTLINES + 2 * MAX_CLUSTERS]; // in 16 groups of directions
 };
@@ -259,7 +262,8 @@ struct tile_figures {
     double s_primary, s_shade, s_shadow;
     uint64_t rays_primary, rays_mirror, rays_shade, rays_shadow;
     uint64_t n_mirrors, n_glossy, n_lit, n_receivers, n_rays_real;
-    uint64_t n_near; // near lights that reach a sample
+    uint64_t n_optics; // samples that see a real mirror or glass
+    uint64_t n_near;   // near lights that reach a sample
     int64_t n_virtual_pixels, n_shadow_pixels, n_refined_pixels;
 };
 
@@ -295,7 +299,8 @@ struct frame {
     bool run_shadow;   // shadow on real surfaces
     bool run_blockers; // real geometry may hide lights from real surfaces
     bool run_bounces;
-    bool cull; // leave out rays that cannot meet the virtual objects
+    bool run_optics; // real mirrors and glass show virtual objects and their shadows
+    bool cull;       // leave out rays that cannot meet the virtual objects
 
     struct gn_layers *layers;
     struct feature *features;     // [h][w]
@@ -308,6 +313,9 @@ struct frame {
 
 /** Fills the frame's layers, features and figures. */
 void gn_tiles_render(struct frame *frame, struct gn_pool *pool);
+/** The light of scratch's n samples, which know what they see. */
+void gn_tiles_light_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                            struct tile_figures *figures);
 
 /* report.c */
 
@@ -348,10 +356,10 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
                       struct tile_figures *figures);
 
 /** Irradiance of the surface of a sample that is none of scratch's, by the frame's lights or the SH
- * irradiance and by near lights, with what hides them. Of `stride` lights only each one is tried
- * that comes as `first`th, for all of them: the mean over all first is exact. */
+ * irradiance and by the set's near lights, with what of the set hides them. Of `stride` lights only
+ * each one is tried that comes as `first`th, for all of them: the mean over all first is exact. */
 void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
-                             const struct sample *sample, int first, int stride,
+                             const struct sample *sample, enum gn_rt_set set, int first, int stride,
                              double out_irradiance[static 3], struct tile_figures *figures);
 
 /* specular.c */
@@ -359,6 +367,19 @@ void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
 /** Adds what ggx and glass surfaces of the virtual samples reflect and let through, and what file
  * materials send themselves; leaves the diffuse base to shading. */
 void gn_specular_shade(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                       struct tile_figures *figures);
+
+/* optics.c: what real mirrors and glass show */
+
+/** Has the scene what the pass is for: a real mirror or glass and a virtual object? */
+bool gn_optics_is_needed(const struct gn_scene *scene);
+/** Memory for the workers' scratches, where the scene needs it. Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_optics_reserve(const struct gn_scene *scene, struct scratch *scratches,
+                                  int n_workers);
+void gn_optics_finish(struct scratch *scratch);
+/** base, lost and gain of those of scratch's n samples, lit already, that see a real mirror or
+ * glass. */
+void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                        struct tile_figures *figures);
 
 /* shadow.c */
@@ -505,6 +526,9 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
                         struct tile_figures *figures);
 void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                          struct tile_figures *figures);
+/** base of a receiver that no virtual object cuts. */
+void gn_reference_sum_uncut(const struct frame *frame, struct scratch *scratch,
+                            struct sample *sample, int n_paths, struct tile_figures *figures);
 
 /* bounce.c */
 

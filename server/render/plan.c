@@ -5,12 +5,24 @@
 #include <math.h>
 
 /** The plan's lines, in the order of the passes. */
-enum line { PRIMARY, REFINE, SHADE, MIRROR, GLOSSY, SHADOW, BLOCKERS, NEAR, ADDED, N_LINES };
+enum line {
+    PRIMARY,
+    REFINE,
+    SHADE,
+    MIRROR,
+    GLOSSY,
+    SHADOW,
+    BLOCKERS,
+    NEAR,
+    ADDED,
+    OPTICS,
+    N_LINES
+};
 
 static const char *const pass_names[N_LINES] = {
-    [PRIMARY] = "primary",   [REFINE] = "refine", [SHADE] = "shade",
-    [MIRROR] = "mirror",     [GLOSSY] = "glossy", [SHADOW] = "shadow",
-    [BLOCKERS] = "blockers", [NEAR] = "near",     [ADDED] = "added",
+    [PRIMARY] = "primary", [REFINE] = "refine", [SHADE] = "shade",       [MIRROR] = "mirror",
+    [GLOSSY] = "glossy",   [SHADOW] = "shadow", [BLOCKERS] = "blockers", [NEAR] = "near",
+    [ADDED] = "added",     [OPTICS] = "optics",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -130,6 +142,16 @@ static const char *why_not_near(const struct frame *frame, const char *no_virtua
     return no_virtual && no_shadow ? no_shadow : NULL;
 }
 
+static const char *why_not_optics(const struct frame *frame)
+{
+    unsigned optics = 1u << GN_MATERIAL_MIRROR | 1u << GN_MATERIAL_GLASS;
+    if (!frame->has_virtual)
+        return "the scene has no virtual object";
+    if (!(frame->scene->real_materials & optics))
+        return "no mirror or glass among the real objects";
+    return NULL;
+}
+
 static const char *why_added(const struct frame *frame)
 {
     return frame->near.n_virtual > 0 ? "light of virtual lamps and screens on real surfaces"
@@ -183,6 +205,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
                  ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
                  : no_shadow,
              why_added(frame));
+    const char *no_optics = why_not_optics(frame);
+    frame->run_optics = !no_optics;
+    set_line(report, OPTICS, no_optics, "a real mirror or glass may show virtual objects");
 }
 
 /** The pass was ready to run and found no work. */
@@ -208,5 +233,6 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
              "no near light reaches a virtual surface, or a real one by way of a virtual object");
     withdraw(report, SHADOW, sum->rays_shadow == 0,
              "no light's ray from a pixel comes near a virtual object");
+    withdraw(report, OPTICS, sum->n_optics == 0, "no real mirror or glass in view");
     withdraw(report, ADDED, sum->n_receivers == 0, "no diffuse real surface in view");
 }

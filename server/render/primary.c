@@ -141,6 +141,7 @@ void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
         s->kind = SAMPLE_NOTHING;
         s->depth = INFINITY;
         s->is_receiver = s->is_cut = s->is_lit = false;
+        s->shown = 0;
     }
     for (int i = 0; i < n; i += GN_RT_PACKET)
         trace_packet(frame, samples + i, n - i < GN_RT_PACKET ? n - i : GN_RT_PACKET, figures);

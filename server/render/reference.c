@@ -359,8 +359,7 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
         for (int k = 0; k < 3; k++) {
             double bounced = s->through[k] * (common[k] + touched[k]);
             s->indirect[k] += bounced;
-            s->radiance[k] +=
-                s->through[k] * (s->surface.albedo[k] / M_PI * sums[0][k]) + bounced;
+            s->radiance[k] += s->through[k] * (s->surface.albedo[k] / M_PI * sums[0][k]) + bounced;
         }
         gn_near_add_emission(frame, s);
         if (frame->near.n > 0)
@@ -405,6 +404,13 @@ static void sum_receiver(const struct frame *frame, struct scratch *scratch, str
     if (frame->run_bounces)
         add_bounces(frame, s, n_paths, figures);
     s->is_summed = true;
+}
+
+void gn_reference_sum_uncut(const struct frame *frame, struct scratch *scratch, struct sample *s,
+                            int n_paths, struct tile_figures *figures)
+{
+    clear_masks(frame, scratch->cut_texels, scratch->cut_places);
+    sum_receiver(frame, scratch, s, n_paths, figures);
 }
 
 void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int n, int n_paths,

@@ -61,6 +61,10 @@ int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
                             pool ? gn_pool_get_size(pool) : 1);
     }
     memset(renderer->scratches, 0, bytes);
+    if (gn_optics_reserve(scene, renderer->scratches, renderer->n_workers) < 0) {
+        gn_renderer_destroy(&renderer);
+        return gn_error_set(out_error, -ENOMEM, "renderer: no memory for real mirrors and glass");
+    }
     renderer->estimate = aligned_alloc(_Alignof(struct estimate), sizeof(*renderer->estimate));
     if (!renderer->estimate) {
         gn_renderer_destroy(&renderer);
@@ -86,6 +90,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     for (int i = 0; i < self->n_workers && self->scratches; i++) {
         free(self->scratches[i].cut_texels);
         free(self->scratches[i].cut_places);
+        gn_optics_finish(&self->scratches[i]);
     }
     free(self->scratches);
     if (self->estimate)

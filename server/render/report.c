@@ -18,6 +18,7 @@ static void sum_figures(const struct frame *frame, struct tile_figures *sum)
         sum->rays_shadow += f->rays_shadow;
         sum->n_mirrors += f->n_mirrors;
         sum->n_glossy += f->n_glossy;
+        sum->n_optics += f->n_optics;
         sum->n_near += f->n_near;
         sum->n_lit += f->n_lit;
         sum->n_receivers += f->n_receivers;

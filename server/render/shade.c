@@ -108,11 +108,11 @@ static void shade_by_irradiance(const struct frame *frame, struct sample *s)
 }
 
 /** Adds the light of the packet's free lanes to their samples' irradiance. */
-static void flush(const struct frame *frame, struct scratch *scratch, double (*irradiance)[3],
-                  struct tile_figures *figures)
+static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
+                  double (*irradiance)[3], struct tile_figures *figures)
 {
     int n;
-    uint32_t hidden = gn_packet_trace(frame, scratch, GN_RT_ALL, &n, &figures->rays_shade);
+    uint32_t hidden = gn_packet_trace(frame, scratch, set, &n, &figures->rays_shade);
     for (int lane = 0; lane < n; lane++) {
         if (hidden >> lane & 1)
             continue;
@@ -152,16 +152,16 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
             if (frame->blend.n > 1)
                 c *= s->weights[probe];
             if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c, INFINITY))
-                flush(frame, scratch, irradiance, figures);
+                flush(frame, scratch, GN_RT_ALL, irradiance, figures);
         }
     }
-    flush(frame, scratch, irradiance, figures);
+    flush(frame, scratch, GN_RT_ALL, irradiance, figures);
     for (int j = 0; j < m; j++)
         reflect_irradiance(&scratch->samples[scratch->lit[j]], irradiance[j]);
 }
 
 void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
-                             const struct sample *s, int first, int stride,
+                             const struct sample *s, enum gn_rt_set set, int first, int stride,
                              double out_irradiance[static 3], struct tile_figures *figures)
 {
     const struct light_list *lights = frame->lights;
@@ -175,13 +175,13 @@ void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
         if (frame->blend.n > 1)
             c *= s->weights[get_probe(lights, l)];
         if (c > 0 && gn_packet_add(scratch, s->org, dir, 0, l, c, INFINITY))
-            flush(frame, scratch, sum, figures);
+            flush(frame, scratch, set, sum, figures);
     }
-    flush(frame, scratch, sum, figures);
+    flush(frame, scratch, set, sum, figures);
     for (int l = first + (by_map ? frame->near.n_placed : 0); l < frame->near.n; l += stride) {
         const struct gn_near_light *light = &frame->near.lights[l];
         struct near_ray ray;
-        if (!gn_near_aim(light, s->org, &ray))
+        if (!(light->role & set) || !gn_near_aim(light, s->org, &ray))
             continue;
         double weight = ray.weight * (double)surface_cosine(&s->surface, ray.dir) *
                         gn_placed_get_weight(frame, s, l) * stride;
@@ -189,7 +189,7 @@ void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
             continue;
         figures->n_near++;
         figures->rays_shade++;
-        bool is_hidden = gn_rt_is_occluded(frame->rt, GN_RT_ALL, s->org, ray.dir, 0, ray.length);
+        bool is_hidden = gn_rt_is_occluded(frame->rt, set, s->org, ray.dir, 0, ray.length);
         for (int k = 0; k < 3 && !is_hidden; k++)
             sum[0][k] += weight * (double)light->intensity[k];
     }

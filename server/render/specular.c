@@ -211,7 +211,7 @@ static void add_diffuse(struct tree *tree, struct sample *s, const struct branch
     double irradiance[3] = {0};
     if (!(s->surface.albedo[0] > 0 || s->surface.albedo[1] > 0 || s->surface.albedo[2] > 0))
         return;
-    gn_shade_get_irradiance(frame, tree->scratch, s, b->first, b->stride, irradiance,
+    gn_shade_get_irradiance(frame, tree->scratch, s, GN_RT_ALL, b->first, b->stride, irradiance,
                             tree->figures);
     for (int k = 0; k < 3; k++)
         tree->radiance[k] += b->weight[k] * s->surface.albedo[k] / M_PI * irradiance[k];

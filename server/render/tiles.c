@@ -18,13 +18,10 @@ static void init_sample(const struct frame *frame, struct sample *sample, int x,
         (frame->options.seed + 1) * UINT64_C(0xd1342543de82ef95) ^ (pixel << 12) ^ (uint64_t)part;
 }
 
-/** What each of the n samples sees, and its light. */
-static void process_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+void gn_tiles_light_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                             struct tile_figures *figures)
 {
     bool is_reference = frame->options.quality == GN_QUALITY_REFERENCE;
-    int64_t t0 = gn_clock_get_monotonic_ns();
-    gn_primary_trace(frame, scratch->samples, n, figures);
     int64_t t1 = gn_clock_get_monotonic_ns();
     gn_shade_follow_mirrors(frame, scratch->samples, n, figures);
     gn_render_weigh_probes(frame, scratch->samples, n);
@@ -45,9 +42,20 @@ static void process_samples(const struct frame *frame, struct scratch *scratch, 
         gn_shadow_samples(frame, scratch, n, figures);
     }
     int64_t t3 = gn_clock_get_monotonic_ns();
-    figures->s_primary += 1e-9 * (double)(t1 - t0);
     figures->s_shade += 1e-9 * (double)(t2 - t1);
     figures->s_shadow += 1e-9 * (double)(t3 - t2);
+}
+
+/** What each of the n samples sees, and its light. */
+static void process_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
+                            struct tile_figures *figures)
+{
+    int64_t start = gn_clock_get_monotonic_ns();
+    gn_primary_trace(frame, scratch->samples, n, figures);
+    figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
+    gn_tiles_light_samples(frame, scratch, n, n_paths, figures);
+    if (frame->run_optics)
+        gn_optics_samples(frame, scratch, n, n_paths, figures);
 }
 
 /** The paper's ratio. */
@@ -62,9 +70,13 @@ static void keep_feature(const struct frame *frame, int x, int y, const struct s
     struct feature *feature =
         &frame->features[(size_t)y * (size_t)frame->camera->width + (size_t)x];
     bool is_virtual = s->kind == SAMPLE_VIRTUAL;
-    feature->owner = is_virtual ? s->object + 1 : 0;
+    bool is_shown = !is_virtual && s->shown != 0; // in a mirror
+    feature->owner = is_virtual ? s->object + 1
+                     : is_shown ? (uint32_t)frame->scene->n_objects + s->shown
+                                : 0;
     for (int k = 0; k < 3; k++)
         feature->color[k] = (float)(is_virtual  ? s->radiance[k] - s->indirect[k]
+                                    : is_shown  ? s->gain[k] - s->indirect[k]
                                     : s->is_cut ? get_factor(frame, s, k)
                                                 : 1);
 }
