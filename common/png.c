@@ -24,6 +24,7 @@ struct job {
     const uint8_t *data; // reading
     size_t size;
     size_t at;
+    bool is_narrow; // 16 bits become 8
     struct gn_png pixels;
     uint8_t *out; // writing; owned
     size_t out_size;
@@ -88,11 +89,13 @@ static void on_flush(png_structp png)
 /* Asks libpng for what gn_png promises; returns the channels of the result. */
 static int choose_transforms(struct job *job, int depth, int color)
 {
-    if (depth == 16) {
+    if (depth == 16 && !job->is_narrow) {
         png_set_strip_alpha(job->png);
         png_set_swap(job->png); // big-endian in the file
         return color & PNG_COLOR_MASK_COLOR ? 3 : 1;
     }
+    if (depth == 16)
+        png_set_scale_16(job->png);
     bool has_alpha =
         (color & PNG_COLOR_MASK_ALPHA) || png_get_valid(job->png, job->info, PNG_INFO_tRNS);
     png_set_expand(job->png);
@@ -119,15 +122,16 @@ static void read_pixels(struct job *job)
     int n_passes = png_set_interlace_handling(job->png);
     int channels = choose_transforms(job, depth, color);
     png_read_update_info(job->png, job->info);
-    int r = depth == 16 ? gn_image16_init(&job->pixels.codes16, (int)width, (int)height, channels)
-                        : gn_image8_init(&job->pixels.codes8, (int)width, (int)height, channels);
+    bool is_wide = depth == 16 && !job->is_narrow;
+    int r = is_wide ? gn_image16_init(&job->pixels.codes16, (int)width, (int)height, channels)
+                    : gn_image8_init(&job->pixels.codes8, (int)width, (int)height, channels);
     job->code = r;
     if (r)
         png_error(job->png, r == -ENOMEM ? "out of memory" : "more than 67108864 pixels");
-    size_t row_bytes = (size_t)width * (size_t)channels * (depth == 16 ? 2 : 1);
+    size_t row_bytes = (size_t)width * (size_t)channels * (is_wide ? 2 : 1);
     if (png_get_rowbytes(job->png, job->info) != row_bytes)
         png_error(job->png, "unexpected layout");
-    uint8_t *pixels = depth == 16 ? (uint8_t *)job->pixels.codes16.data : job->pixels.codes8.data;
+    uint8_t *pixels = is_wide ? (uint8_t *)job->pixels.codes16.data : job->pixels.codes8.data;
     for (int pass = 0; pass < n_passes; pass++)
         for (size_t y = 0; y < height; y++)
             png_read_row(job->png, pixels + y * row_bytes, NULL);
@@ -146,10 +150,11 @@ static int run_read(struct job *job)
     return 0;
 }
 
-int gn_png_read_memory(const void *data, size_t size, struct gn_png *out_png,
+static int read_memory(const void *data, size_t size, bool is_narrow, struct gn_png *out_png,
                        struct gn_error *out_error)
 {
-    struct job job = {.data = data, .size = size, .message = "out of memory"};
+    struct job job = {
+        .data = data, .size = size, .is_narrow = is_narrow, .message = "out of memory"};
     *out_png = (struct gn_png){0};
     int r = run_read(&job);
     png_destroy_read_struct(&job.png, &job.info, NULL);
@@ -159,6 +164,21 @@ int gn_png_read_memory(const void *data, size_t size, struct gn_png *out_png,
     }
     *out_png = job.pixels;
     return 0;
+}
+
+int gn_png_read_memory(const void *data, size_t size, struct gn_png *out_png,
+                       struct gn_error *out_error)
+{
+    return read_memory(data, size, false, out_png, out_error);
+}
+
+int gn_png_read_memory8(const void *data, size_t size, struct gn_image8 *out_image,
+                        struct gn_error *out_error)
+{
+    struct gn_png png;
+    int r = read_memory(data, size, true, &png, out_error);
+    *out_image = png.codes8;
+    return r;
 }
 
 static int run_write(struct job *job, const uint8_t *pixels, int width, int height, int channels,

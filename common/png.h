@@ -32,6 +32,9 @@ struct gn_png {
  */
 GN_MUST_USE int gn_png_read_memory(const void *data, size_t size, struct gn_png *out_png,
                                    struct gn_error *out_error);
+/** The same as 8 bits whatever the file has: codes of 16 are rounded, their alpha stays. */
+GN_MUST_USE int gn_png_read_memory8(const void *data, size_t size, struct gn_image8 *out_image,
+                                    struct gn_error *out_error);
 /** Frees the pixels. A zeroed one is fine. */
 void gn_png_finish(struct gn_png *png);
 

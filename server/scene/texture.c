@@ -144,22 +144,6 @@ static int init_from_codes(struct gn_texture *texture, const struct gn_image8 *c
     return ret;
 }
 
-/** 16-bit codes rounded to 8. */
-static int init_from_codes16(struct gn_texture *texture, const struct gn_image16 *wide,
-                             bool is_srgb)
-{
-    struct gn_image8 codes;
-    int ret = gn_image8_init(&codes, wide->width, wide->height, wide->channels);
-    if (ret < 0)
-        return ret;
-    size_t n = (size_t)wide->width * (size_t)wide->height * (size_t)wide->channels;
-    for (size_t i = 0; i < n; i++)
-        codes.data[i] = (uint8_t)((wide->data[i] + 128u) / 257u);
-    ret = init_from_codes(texture, &codes, is_srgb);
-    gn_image8_finish(&codes);
-    return ret;
-}
-
 static int check_texels(long texels, long max_texels, struct gn_error *out_error)
 {
     return texels <= max_texels
@@ -182,15 +166,14 @@ static long get_png_texels(const uint8_t *data, size_t size)
 static int read_png(const void *data, size_t size, bool is_srgb, long max_texels,
                     struct gn_texture *texture, struct gn_error *out_error)
 {
-    struct gn_png png = {0};
+    struct gn_image8 codes = {0};
     int ret = check_texels(get_png_texels(data, size), max_texels, out_error);
     if (ret == 0)
-        ret = gn_png_read_memory(data, size, &png, out_error);
+        ret = gn_png_read_memory8(data, size, &codes, out_error);
     if (ret < 0)
         return ret;
-    ret = png.codes8.data ? init_from_codes(texture, &png.codes8, is_srgb)
-                          : init_from_codes16(texture, &png.codes16, is_srgb);
-    gn_png_finish(&png);
+    ret = init_from_codes(texture, &codes, is_srgb);
+    gn_image8_finish(&codes);
     return ret < 0 ? gn_error_set(out_error, ret, "no memory for the picture") : 0;
 }
 

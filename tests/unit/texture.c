@@ -114,6 +114,23 @@ static void test_far_away_the_mean_is_left(void **state)
     free(rgba);
 }
 
+static void test_sixteen_bits_keep_their_alpha(void **state)
+{
+    (void)state;
+    // One texel of 16 bits: 8080 0100 0081 4000.
+    static const uint8_t png[] = {
+        0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44,
+        0x52, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x10, 0x06, 0x00, 0x00, 0x00, 0x4f,
+        0x85, 0x18, 0xca, 0x00, 0x00, 0x00, 0x11, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0x68,
+        0x68, 0x60, 0x64, 0x60, 0x68, 0x74, 0x60, 0x00, 0x00, 0x09, 0x92, 0x01, 0xc3, 0xee, 0x76,
+        0x8b, 0x9a, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
+    static const uint8_t rounded[4] = {128, 1, 1, 64};
+    struct gn_texture texture;
+    assert_int_equal(gn_texture_read_memory(png, sizeof(png), false, 1, &texture, NULL), 0);
+    assert_memory_equal(texture.levels[0], rounded, sizeof(rounded));
+    gn_texture_finish(&texture);
+}
+
 static void test_bad_pictures_are_refused(void **state)
 {
     (void)state;
@@ -156,6 +173,7 @@ int main(void)
         cmocka_unit_test(test_beyond_the_edges),
         cmocka_unit_test(test_srgb_is_made_linear_before_it_is_mixed),
         cmocka_unit_test(test_far_away_the_mean_is_left),
+        cmocka_unit_test(test_sixteen_bits_keep_their_alpha),
         cmocka_unit_test(test_bad_pictures_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
