@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/light/luminance.h"
+
 int gn_render_lights_reserve(struct light_list *list, int64_t capacity)
 {
     list->n = list->n_lit = list->n_groups = 0;
@@ -68,11 +70,6 @@ void gn_render_lights_pad(struct light_list *list, int multiple)
     }
 }
 
-static double get_luminance(const double rgb[static 3])
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
 /** So many directions that a disc's are as strong as a light in 64, and no step of its shadow's
  * edge is coarser than an eighth. An even number; `spare`: how many more there may be. */
 static int count_directions(const struct gn_light *light, double share, int spare)
@@ -122,7 +119,7 @@ static void add_lights(const struct gn_lighting_state *state, int n, int spare,
             some[k] += i < n ? state->lights[i].irradiance[k] : 0;
         }
     }
-    double energy = get_luminance(all);
+    double energy = gn_luminance_of_sum(all);
     for (int i = 0; i < n; i++) {
         const struct gn_light *light = &state->lights[i];
         double irradiance[3];
@@ -134,7 +131,7 @@ static void add_lights(const struct gn_lighting_state *state, int n, int spare,
                 list->total[k] += irradiance[k];
             continue;
         }
-        double share = energy > 0 ? get_luminance(irradiance) / energy : 0;
+        double share = energy > 0 ? gn_luminance_of_sum(irradiance) / energy : 0;
         int n_directions = count_directions(light, share, spare);
         spare -= n_directions - 1;
         add_light(light, irradiance, n_directions, list);

@@ -15,6 +15,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "server/light/luminance.h"
+
 // A texel with more than this share of the map's luminous energy is cut into n x n parts.
 #define SHARE_4X4 1e-2
 #define SHARE_2X2 1e-3
@@ -27,11 +29,6 @@
 // Edges of texels of maps with fewer texels are no arcs of great circles but bend: in steps.
 #define FINE_TEXELS 65536
 #define EDGE_STEPS 8
-
-static double get_luminance(const double rgb[static 3])
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
 
 static void get_texel_irradiance(const struct gn_radiance_map *map, size_t i, double out[static 3])
 {
@@ -89,7 +86,7 @@ static bool get_moment(const struct gn_radiance_map *map, double x, double y, do
 
 static int count_parts(const double irradiance[static 3], double total)
 {
-    double share = total > 0 ? get_luminance(irradiance) / total : 0;
+    double share = total > 0 ? gn_luminance_of_sum(irradiance) / total : 0;
     return share > SHARE_4X4 ? 4 : share > SHARE_2X2 ? 2 : 1;
 }
 
@@ -257,7 +254,7 @@ static void fill_cdf(struct light_list *list)
     for (int i = 0; i < list->n; i++) {
         const double e[3] = {list->irradiance[0][i], list->irradiance[1][i],
                              list->irradiance[2][i]};
-        sum += get_luminance(e);
+        sum += gn_luminance_of_sum(e);
         list->cdf[i] = sum;
     }
     for (int i = 0; i < list->n && sum > 0; i++)
@@ -288,7 +285,7 @@ static void add_map(const struct gn_radiance_map *map, struct light_list *list,
         for (int k = 0; k < 3; k++)
             total[k] += irradiance[k];
     }
-    double luminance = get_luminance(total);
+    double luminance = gn_luminance_of_sum(total);
     add_texels(map, luminance, false, list, places);
     add_texels(map, luminance, true, list, places);
     if (has_fill(map))
