@@ -4,8 +4,6 @@
  * Materials of glTF files as Assimp gives them. Numbers and strings are the file's: not trusted.
  */
 #include <errno.h>
-#include <limits.h>
-#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,14 +13,8 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
-#include "common/file.h"
-#include "common/image.h"
 #include "server/scene/mesh_import.h"
-
-/** Largest file of a picture, bytes. */
-#define MAX_PICTURE_BYTES (1L << 28)
-/** Longest list of what is ignored. */
-#define MAX_IGNORED 400
+#include "server/scene/mesh_pictures.h"
 
 /** What files ask for that is not done. */
 enum ignored {
@@ -62,23 +54,13 @@ static const char *const ignored_names[N_IGNORED] = {
     [IGNORED_LIGHTS] = "lights",
 };
 
-/** A picture that is already there, or cannot be. */
-struct known {
-    char name[sizeof(((struct aiString *)0)->data)];
-    bool is_srgb;
-    int texture; // < 0: it cannot be read
-};
-
 struct reader {
     const char *path;
     const struct aiScene *scene;
     struct gn_mesh *mesh;
     struct gn_error *error;
     bool is_ignored[N_IGNORED];
-    char lost[MAX_IGNORED / 2]; // the first picture that cannot be read, and why
-    struct known *known;        // [GN_MESH_MAX_TEXTURES], owned
-    int n_known;
-    long texels_left;
+    struct gn_mesh_pictures pictures;
 };
 
 static float get_float(const struct aiMaterial *material, const char *key, unsigned type,
@@ -100,141 +82,6 @@ static bool has_property(const struct aiMaterial *material, const char *key)
             return true;
     }
     return false;
-}
-
-static int to_hex(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
-/** A URI's %XX as the bytes they stand for, in place. */
-static void decode_percents(char *text)
-{
-    char *out = text;
-    for (const char *in = text; *in; in++) {
-        int high = *in == '%' ? to_hex(in[1]) : -1;
-        int low = high >= 0 ? to_hex(in[2]) : -1;
-        *out++ = low > 0 || (low == 0 && high > 0) ? (char)(high * 16 + low) : *in;
-        in += low > 0 || (low == 0 && high > 0) ? 2 : 0;
-    }
-    *out = '\0';
-}
-
-/** The file's real path; refused where that is not in the mesh's folder or below. -ENOENT: there is
- * none. */
-static int find_picture(const struct reader *r, const char *name, char out[static PATH_MAX])
-{
-    char folder[PATH_MAX];
-    char joined[PATH_MAX];
-    const char *slash = strrchr(r->path, '/');
-    int n_folder = slash ? (int)(slash - r->path) + 1 : 0;
-    int n = name[0] == '/' ? snprintf(joined, sizeof(joined), "%s", name)
-                           : snprintf(joined, sizeof(joined), "%.*s%s", n_folder, r->path, name);
-    if (n < 0 || n >= PATH_MAX)
-        return -ENAMETOOLONG;
-    n = snprintf(folder, sizeof(folder), "%.*s.", n_folder, r->path);
-    char real_folder[PATH_MAX];
-    if (n < 0 || n >= PATH_MAX || !realpath(folder, real_folder) || !realpath(joined, out))
-        return -ENOENT;
-    size_t length = strlen(real_folder);
-    if (strncmp(out, real_folder, length) != 0 || (length > 1 && out[length] != '/'))
-        return gn_error_set(r->error, -EINVAL,
-                            "%s: its picture '%s' lies outside the file's folder", r->path, name);
-    return 0;
-}
-
-/** Pixels that Assimp has unpacked: B, G, R, A. */
-static int take_pixels(struct reader *r, const struct aiTexture *in, bool is_srgb,
-                       struct gn_texture *texture, struct gn_error *why)
-{
-    size_t n = (size_t)in->mWidth * in->mHeight;
-    if (in->mWidth > GN_IMAGE_MAX_SIDE || in->mHeight > GN_IMAGE_MAX_SIDE ||
-        n > (size_t)r->texels_left)
-        return gn_error_set(why, -EINVAL, "too large");
-    uint8_t *rgba = malloc(4 * n + 1);
-    if (!rgba)
-        return -ENOMEM;
-    for (size_t i = 0; i < n; i++) {
-        const struct aiTexel *texel = &in->pcData[i];
-        const uint8_t out[4] = {texel->r, texel->g, texel->b, texel->a};
-        memcpy(rgba + 4 * i, out, sizeof(out));
-    }
-    int ret = gn_texture_init(texture, rgba, (int)in->mWidth, (int)in->mHeight, is_srgb);
-    free(rgba);
-    return ret;
-}
-
-static int read_picture(struct reader *r, const char *name, bool is_srgb,
-                        struct gn_texture *texture, struct gn_error *why)
-{
-    const struct aiTexture *embedded = NULL;
-    if (name[0] == '*') {
-        long index = strtol(name + 1, NULL, 10);
-        if (index >= 0 && index < (long)r->scene->mNumTextures && r->scene->mTextures)
-            embedded = r->scene->mTextures[index];
-        if (!embedded || !embedded->pcData)
-            return gn_error_set(why, -EINVAL, "the file has no such picture");
-    }
-    if (embedded && embedded->mHeight > 0)
-        return take_pixels(r, embedded, is_srgb, texture, why);
-    if (embedded)
-        return gn_texture_read_memory(embedded->pcData, embedded->mWidth, is_srgb, r->texels_left,
-                                      texture, why);
-    char decoded[sizeof(r->known->name)];
-    char path[PATH_MAX];
-    (void)snprintf(decoded, sizeof(decoded), "%s", name);
-    decode_percents(decoded);
-    int ret = find_picture(r, decoded, path);
-    if (ret == -EINVAL)
-        return -EACCES; // said already
-    if (ret < 0)
-        return gn_error_set(why, ret, "there is no such file");
-    uint8_t *data = NULL;
-    size_t size = 0;
-    ret = gn_file_read(path, MAX_PICTURE_BYTES, &data, &size, why);
-    if (ret == 0)
-        ret = gn_texture_read_memory(data, size, is_srgb, r->texels_left, texture, why);
-    free(data);
-    return ret;
-}
-
-/** The texture of that name, read where it is new. *out NULL: it cannot be read. */
-static int get_texture(struct reader *r, const char *name, bool is_srgb,
-                       const struct gn_texture **out)
-{
-    struct gn_error why = {0};
-    struct gn_mesh *mesh = r->mesh;
-    *out = NULL;
-    for (int i = 0; i < r->n_known; i++) {
-        if (r->known[i].is_srgb == is_srgb && strcmp(r->known[i].name, name) == 0) {
-            *out = r->known[i].texture >= 0 ? &mesh->textures[r->known[i].texture] : NULL;
-            return 0;
-        }
-    }
-    if (r->n_known == GN_MESH_MAX_TEXTURES)
-        return gn_error_set(r->error, -EFBIG, "%s: more than %d pictures", r->path,
-                            GN_MESH_MAX_TEXTURES);
-    struct known *known = &r->known[r->n_known++];
-    known->texture = -1;
-    known->is_srgb = is_srgb;
-    (void)snprintf(known->name, sizeof(known->name), "%s", name);
-    struct gn_texture *texture = &mesh->textures[mesh->n_textures];
-    int ret = read_picture(r, name, is_srgb, texture, &why);
-    if (ret == -EACCES)
-        return -EINVAL;
-    if (ret == -ENOMEM)
-        return gn_error_set(r->error, ret, "%s: no memory for its pictures", r->path);
-    if (ret < 0 && !r->lost[0])
-        (void)snprintf(r->lost, sizeof(r->lost), "picture %.64s (%.100s)", name, why.text);
-    if (ret < 0)
-        return 0;
-    known->texture = mesh->n_textures++;
-    r->texels_left -= (long)texture->width * texture->height;
-    *out = texture;
-    return 0;
 }
 
 static enum gn_texture_wrap get_wrap(enum aiTextureMapMode mode)
@@ -264,7 +111,7 @@ static int read_slot(struct reader *r, const struct aiMaterial *material, enum a
     }
     slot->wrap_u = get_wrap(modes[0]);
     slot->wrap_v = get_wrap(modes[1]);
-    return get_texture(r, name.data, is_srgb, &slot->texture);
+    return gn_mesh_pictures_get(&r->pictures, name.data, is_srgb, &slot->texture);
 }
 
 static void note_ignored(struct reader *r, const struct aiMaterial *material)
@@ -368,10 +215,12 @@ static void note_meshes(struct reader *r)
 
 static int write_ignored(struct reader *r)
 {
-    char text[MAX_IGNORED * 2] = "";
+    char text[1024] = ""; // all names, and the lost one's
     size_t n = 0;
     for (int i = 0; i <= N_IGNORED; i++) {
-        const char *item = i == N_IGNORED ? r->lost : r->is_ignored[i] ? ignored_names[i] : "";
+        const char *item = i == N_IGNORED     ? r->pictures.lost
+                           : r->is_ignored[i] ? ignored_names[i]
+                                              : "";
         if (item[0])
             n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", n > 0 ? ", " : "", item);
     }
@@ -409,24 +258,23 @@ static int read_all(struct reader *r)
 int gn_mesh_read_materials(const char *path, const struct aiScene *scene, struct gn_mesh *mesh,
                            struct gn_error *out_error)
 {
-    struct reader r = {.path = path,
-                       .scene = scene,
-                       .mesh = mesh,
-                       .error = out_error,
-                       .texels_left = GN_MESH_MAX_TEXELS};
+    struct reader r = {
+        .path = path,
+        .scene = scene,
+        .mesh = mesh,
+        .error = out_error,
+        .pictures = {.path = path, .scene = scene, .mesh = mesh, .error = out_error}};
     if (!scene->mMaterials || scene->mNumMaterials < 1 ||
         scene->mNumMaterials > GN_MESH_MAX_MATERIALS)
         return gn_error_set(out_error, -EFBIG, "%s: %u materials; 1 to %d are read", path,
                             scene->mNumMaterials, GN_MESH_MAX_MATERIALS);
     mesh->materials = calloc(scene->mNumMaterials, sizeof(*mesh->materials));
-    mesh->textures = calloc(GN_MESH_MAX_TEXTURES, sizeof(*mesh->textures));
-    r.known = calloc(GN_MESH_MAX_TEXTURES, sizeof(*r.known));
-    int ret = -ENOMEM;
-    if (mesh->materials && mesh->textures && r.known) {
+    int ret = mesh->materials ? gn_mesh_pictures_init(&r.pictures) : -ENOMEM;
+    if (ret == 0) {
         mesh->n_materials = (int)scene->mNumMaterials;
         ret = read_all(&r);
     }
-    free(r.known);
+    gn_mesh_pictures_finish(&r.pictures);
     return ret == -ENOMEM ? gn_error_set(out_error, ret, "%s: no memory for its materials", path)
                           : ret;
 }

@@ -5,6 +5,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -239,6 +240,35 @@ static void test_rays_pass_where_alpha_is_low(void **state)
     gn_scene_destroy(&scene);
 }
 
+/** A picture's bytes that may not be read; even root asks, as somebody else. */
+static void test_a_picture_without_permission(void **state)
+{
+    (void)state;
+    struct gn_mesh mesh = {0};
+    struct gn_error error;
+    const uint8_t grey[3] = {128, 128, 128};
+    const char *members = "\"materials\":[{\"normalTexture\":{\"index\":0}}],\"textures\":[{"
+                          "\"source\":0}],\"images\":[{\"uri\":\"color.png\"}]";
+    write_picture("color.png", grey, grey);
+    assert_int_equal(chmod(gn_test_folder_get_path("color.png"), 0), 0);
+    assert_int_equal(chmod(gn_test_folder_get_path("."), 0777), 0);
+    assert_int_equal(read_quad(members, &mesh, &error), 0);
+    gn_mesh_finish(&mesh);
+    bool is_root = geteuid() == 0;
+    assert_int_equal(is_root ? seteuid(65534) : 0, 0);
+    const char *path = gn_test_folder_get_path("q.gltf");
+    bool is_seen = faccessat(AT_FDCWD, path, R_OK, AT_EACCESS) == 0;
+    int ret = gn_mesh_read_file(path, &mesh, &error);
+    assert_int_equal(is_root ? seteuid(0) : 0, 0);
+    if (!is_seen) // not even the folder
+        skip();
+    assert_string_equal(error.text, "");
+    assert_int_equal(ret, 0);
+    assert_non_null(strstr(mesh.ignored, "color.png"));
+    gn_mesh_finish(&mesh);
+    assert_int_equal(chmod(gn_test_folder_get_path("color.png"), 0600), 0);
+}
+
 static void test_what_is_not_done_is_named(void **state)
 {
     (void)state;
@@ -386,6 +416,7 @@ int main(void)
         cmocka_unit_test(test_factors_times_pictures),
         cmocka_unit_test(test_normal_maps_lean_as_painted),
         cmocka_unit_test(test_rays_pass_where_alpha_is_low),
+        cmocka_unit_test(test_a_picture_without_permission),
         cmocka_unit_test(test_what_is_not_done_is_named),
         cmocka_unit_test(test_hostile_files_are_refused),
         cmocka_unit_test(test_texture_coordinates_are_finite),
