@@ -3,6 +3,7 @@
 #include "server/scene/material.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdbool.h>
 
 #include "server/scene/scene.h"
@@ -36,8 +37,10 @@ int gn_mesh_material_check(struct gn_mesh_material *material, struct gn_error *o
     int ret = gn_material_check(&material->factors, out_error);
     if (ret < 0)
         return ret;
-    if (!is_share(material->alpha) || !is_share(material->alpha_cutoff))
-        return gn_error_set(out_error, -EINVAL, "alpha and its cut-off must lie in [0, 1]");
+    if (!is_share(material->alpha) ||
+        !(material->alpha_cutoff >= 0 && isfinite(material->alpha_cutoff)))
+        return gn_error_set(out_error, -EINVAL,
+                            "alpha must lie in [0, 1], and its cut-off may not be negative");
     if (!(material->normal_scale >= -1e3f && material->normal_scale <= 1e3f))
         return gn_error_set(out_error, -EINVAL, "a normal map's scale must lie in [-1000, 1000]");
     for (int k = 0; k < 3; k++) {

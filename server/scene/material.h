@@ -41,7 +41,8 @@ struct gn_material {
 struct gn_mesh_material {
     struct gn_material factors;
     float alpha;        // [0, 1]
-    float alpha_cutoff; // where alpha is less, nothing is there; 0: everywhere something is
+    float alpha_cutoff; // where alpha is less, nothing is there; 0: everywhere something is,
+                        // above 1: nowhere
     float normal_scale; // of the normal map's x and y
     float emission[3];  // W/(sr m^2), [0, GN_SCENE_MAX_EMISSION]; from both sides
     struct gn_texture_slot base_color, metallic_roughness, normal, emissive;

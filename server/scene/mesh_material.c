@@ -24,6 +24,9 @@ enum ignored {
     IGNORED_SHEEN,
     IGNORED_TRANSMISSION,
     IGNORED_SPECULAR,
+    IGNORED_UNLIT,
+    IGNORED_IOR,
+    IGNORED_VOLUME,
     IGNORED_TRANSFORM,
     IGNORED_UV_SET,
     IGNORED_NO_UV,
@@ -43,6 +46,9 @@ static const char *const ignored_names[N_IGNORED] = {
     [IGNORED_SHEEN] = "sheen",
     [IGNORED_TRANSMISSION] = "transmission",
     [IGNORED_SPECULAR] = "specular-glossiness (its specular colour)",
+    [IGNORED_UNLIT] = "unlit materials (lit like others)",
+    [IGNORED_IOR] = "an index of refraction outside [1, 4]",
+    [IGNORED_VOLUME] = "volumes",
     [IGNORED_TRANSFORM] = "texture transforms",
     [IGNORED_UV_SET] = "second texture coordinates",
     [IGNORED_NO_UV] = "pictures on a mesh without texture coordinates",
@@ -125,6 +131,8 @@ static void note_ignored(struct reader *r, const struct aiMaterial *material)
     is_ignored[IGNORED_CLEARCOAT] |= get_float(material, AI_MATKEY_CLEARCOAT_FACTOR, 0) > 0;
     is_ignored[IGNORED_SHEEN] |= has_property(material, "$clr.sheen.factor");
     is_ignored[IGNORED_TRANSMISSION] |= get_float(material, AI_MATKEY_TRANSMISSION_FACTOR, 0) > 0;
+    is_ignored[IGNORED_UNLIT] |= has_property(material, "$mat.gltf.unlit");
+    is_ignored[IGNORED_VOLUME] |= has_property(material, "$mat.volume.thicknessFactor");
     is_ignored[IGNORED_TRANSFORM] |= has_property(material, "$tex.uvtrafo");
 }
 
@@ -166,6 +174,11 @@ static int read_surface(struct reader *r, const struct aiMaterial *material,
     out->factors.type = GN_MATERIAL_GGX;
     out->factors.metallic = get_float(material, AI_MATKEY_METALLIC_FACTOR, 1);
     out->factors.roughness = get_float(material, AI_MATKEY_ROUGHNESS_FACTOR, 1);
+    float ior = get_float(material, AI_MATKEY_REFRACTI, GN_MATERIAL_DEFAULT_IOR);
+    if (ior >= 1 && ior <= GN_MATERIAL_MAX_IOR)
+        out->factors.ior = ior;
+    else
+        r->is_ignored[IGNORED_IOR] = true;
     return read_slot(r, material, aiTextureType_UNKNOWN, false, &out->metallic_roughness, &found);
 }
 

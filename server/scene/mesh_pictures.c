@@ -73,10 +73,10 @@ static int take_pixels(struct gn_mesh_pictures *p, const struct aiTexture *in, b
                        struct gn_texture *texture, struct gn_error *why)
 {
     size_t n = (size_t)in->mWidth * in->mHeight;
-    if (in->mWidth > GN_IMAGE_MAX_SIDE || in->mHeight > GN_IMAGE_MAX_SIDE ||
+    if (n < 1 || in->mWidth > GN_IMAGE_MAX_SIDE || in->mHeight > GN_IMAGE_MAX_SIDE ||
         n > (size_t)p->texels_left)
-        return gn_error_set(why, -EINVAL, "too large");
-    uint8_t *rgba = malloc(4 * n + 1);
+        return gn_error_set(why, -EINVAL, "empty or too large");
+    uint8_t *rgba = malloc(4 * n);
     if (!rgba)
         return -ENOMEM;
     for (size_t i = 0; i < n; i++) {

@@ -240,6 +240,24 @@ static void test_rays_pass_where_alpha_is_low(void **state)
     gn_scene_destroy(&scene);
 }
 
+static void test_numbers_beside_the_pictures(void **state)
+{
+    (void)state;
+    struct gn_mesh mesh = {0};
+    struct gn_error error;
+    int ret = read_quad("\"extensionsUsed\":[\"KHR_materials_ior\"],\"materials\":[{"
+                        "\"pbrMetallicRoughness\":{\"metallicFactor\":0},\"alphaMode\":\"MASK\","
+                        "\"alphaCutoff\":1.5,\"extensions\":{\"KHR_materials_ior\":{\"ior\":"
+                        "1.75}}}]",
+                        &mesh, &error);
+    assert_string_equal(error.text, "");
+    assert_int_equal(ret, 0);
+    assert_null(mesh.ignored);
+    assert_float_equal(mesh.materials[0].factors.ior, 1.75f, 0);
+    assert_true(gn_mesh_is_cut_out(&mesh, 0, 0.2f, 0.2f)); // as glTF has it above 1
+    gn_mesh_finish(&mesh);
+}
+
 /** A picture's bytes that may not be read; even root asks, as somebody else. */
 static void test_a_picture_without_permission(void **state)
 {
@@ -282,6 +300,15 @@ static void test_what_is_not_done_is_named(void **state)
         {"\"extensionsUsed\":[\"KHR_materials_clearcoat\"],\"materials\":[{\"extensions\":{"
          "\"KHR_materials_clearcoat\":{\"clearcoatFactor\":1}}}]",
          "clearcoat"},
+        {"\"extensionsUsed\":[\"KHR_materials_unlit\"],\"materials\":[{\"extensions\":{"
+         "\"KHR_materials_unlit\":{}}}]",
+         "unlit"},
+        {"\"extensionsUsed\":[\"KHR_materials_volume\"],\"materials\":[{\"extensions\":{"
+         "\"KHR_materials_volume\":{\"thicknessFactor\":1}}}]",
+         "volumes"},
+        {"\"extensionsUsed\":[\"KHR_materials_ior\"],\"materials\":[{\"extensions\":{"
+         "\"KHR_materials_ior\":{\"ior\":40}}}]",
+         "index of refraction"},
         {"\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,"
          "\"texCoord\":1}}}],\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"color.png\"}]",
          "second texture coordinates"},
@@ -416,6 +443,7 @@ int main(void)
         cmocka_unit_test(test_factors_times_pictures),
         cmocka_unit_test(test_normal_maps_lean_as_painted),
         cmocka_unit_test(test_rays_pass_where_alpha_is_low),
+        cmocka_unit_test(test_numbers_beside_the_pictures),
         cmocka_unit_test(test_a_picture_without_permission),
         cmocka_unit_test(test_what_is_not_done_is_named),
         cmocka_unit_test(test_hostile_files_are_refused),
