@@ -10,13 +10,12 @@
 #include <string.h>
 
 #include "client/cmd.h"
-#include "common/clock.h"
+#include "client/replay.h"
 #include "common/file.h"
 #include "proto/attr.h"
 
-/** Most bytes of a file of poses, and how long the server's last words are waited for. */
+/** Most bytes of a file of poses. */
 #define MAX_FILE_BYTES ((size_t)256 << 20)
-#define LAST_WORDS_MS 200
 #define ORBIT_PERIOD_S 4.0
 
 static const struct gn_option option_table[] = {
@@ -49,7 +48,8 @@ static const struct gn_option option_table[] = {
      .min = 0.001,
      .max = 1000,
      .value_name = "HZ",
-     .help = "Poses per second. Without it a file keeps its own times; an orbit goes at 60."},
+     .help = "Poses per second. Without it a file keeps its own times; an orbit goes at 60. Up to "
+             "2 s late the poses catch up; beyond, the rest is shifted and said."},
     {.key = "count",
      .flag = "count",
      .type = GN_OPTION_INT,
@@ -77,12 +77,11 @@ struct timed_pose {
 
 /** One run of the command. */
 struct track {
-    struct gn_client *client;
+    struct gn_replay replay;
     struct gn_msg_pose message;
     struct timed_pose *poses; // [n], owned; NULL: an orbit
     long n;
-    double orbit_m, rate_hz; // rate 0: the file's times
-    long n_wanted, n_sent;   // wanted 0: all
+    double orbit_m;
 };
 
 static int read_line(struct track *t, const char *line, size_t size, const char *name,
@@ -134,105 +133,106 @@ static int read_poses(struct track *t, const char *path, struct gn_error *out_er
     return err;
 }
 
-/** The i-th pose and its time after the first. */
-static struct timed_pose get_pose(const struct track *t, long i)
+/** The pose that is next, its time after the first. */
+static struct timed_pose get_pose(const struct track *t)
 {
-    if (t->poses) {
-        struct timed_pose pose = t->poses[i];
-        pose.time_s = t->rate_hz > 0 ? (double)i / t->rate_hz : pose.time_s - t->poses[0].time_s;
-        return pose;
-    }
-    double time_s = (double)i / t->rate_hz;
+    long i = t->replay.n_sent;
+    if (t->poses)
+        return (struct timed_pose){t->poses[i].time_s - t->poses[0].time_s, t->poses[i].pose};
+    double time_s = (double)i / t->replay.rate_hz;
     double angle = 2 * 3.14159265358979323846 * time_s / ORBIT_PERIOD_S;
     return (struct timed_pose){time_s,
                                {{cos(angle / 2), 0, 0, sin(angle / 2)},
                                 {t->orbit_m * cos(angle), t->orbit_m * sin(angle), 0}}};
 }
 
-/** Listens to the server until then. Returns 0, or a negative errno and a sentence. */
-static int wait_until(const struct track *t, int64_t until_ns, struct gn_error *out_error)
-{
-    for (;;) {
-        int64_t left_ns = until_ns - gn_client_now_ns();
-        struct gn_client_event event;
-        if (gn_cmd_is_interrupted())
-            return gn_error_set(out_error, -EINTR, "interrupted");
-        int left_ms = left_ns > 0 ? (int)(left_ns / GN_NS_PER_MS) + 1 : 0;
-        int rc = gn_client_poll(t->client, left_ms > 100 ? 100 : left_ms, &event);
-        if (rc < 0)
-            return gn_cmd_set_fault(t->client, rc, out_error);
-        if (rc > 0 && (rc = gn_cmd_take_event(&event, out_error)) < 0)
-            return rc;
-        if (rc == 0 && left_ns <= 0)
-            return 0;
-    }
-}
-
 static int send_all(struct track *t, struct gn_error *out_error)
 {
-    int64_t start_ns = gn_client_now_ns();
-    int err = 0;
-    while (!err && !(t->poses && t->n_sent == t->n) &&
-           !(t->n_wanted > 0 && t->n_sent == t->n_wanted)) {
-        struct timed_pose pose = get_pose(t, t->n_sent);
-        int64_t due_ns = start_ns + (int64_t)(pose.time_s * 1e9);
-        err = wait_until(t, due_ns, out_error);
+    struct gn_replay *r = &t->replay;
+    while (!(t->poses && r->n_sent == t->n) && !(r->n_wanted > 0 && r->n_sent == r->n_wanted)) {
+        struct timed_pose pose = get_pose(t);
+        const struct gn_capture due = {.time_s = pose.time_s};
+        int err = gn_replay_wait(r, &due, out_error);
         if (err)
-            break;
+            return err;
         gn_cmd_make_transform(&pose.pose, &t->message.world_from_object);
         t->message.has_world_from_object = true;
-        t->message.time_ns = gn_client_to_server_ns(t->client, gn_client_now_ns());
-        err = gn_client_send_pose(t->client, &t->message);
+        t->message.time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
+        err = gn_client_send_pose(r->client, &t->message);
         if (err)
-            return gn_cmd_set_fault(t->client, err, out_error);
-        t->n_sent++;
+            return gn_cmd_set_fault(r->client, err, out_error);
+        r->n_sent++;
     }
-    // What is wrong with the last ones is said only now.
-    return err ? err : wait_until(t, gn_client_now_ns() + LAST_WORDS_MS * GN_NS_PER_MS, out_error);
+    return gn_replay_wait_last(r, out_error); // what is wrong with the last ones is said only now
+}
+
+/** What is wrong with the options together; NULL: nothing. */
+static const char *find_misuse(const struct gn_options *options, const struct gn_msg_pose *message)
+{
+    const char *name = gn_options_get_string(options, NULL, NULL, "object");
+    if (!name[0] || strlen(name) >= sizeof(message->object))
+        return "--object: names have 1 to 63 bytes";
+    if (gn_options_is_set(options, NULL, NULL, "poses") ==
+        gn_options_is_set(options, NULL, NULL, "orbit"))
+        return "give one of --poses and --orbit";
+    return NULL;
 }
 
 static int prepare(struct track *t, const struct gn_options *options, struct gn_error *out_error)
 {
-    const char *name = gn_options_get_string(options, NULL, NULL, "object");
     const char *path = gn_options_get_string(options, NULL, NULL, "poses");
-    bool has_orbit = gn_options_is_set(options, NULL, NULL, "orbit");
-    if (!name[0] || strlen(name) >= sizeof(t->message.object))
-        return gn_error_set(out_error, -EINVAL, "--object: names have 1 to 63 bytes");
-    if ((path != NULL) == has_orbit)
-        return gn_error_set(out_error, -EINVAL, "give one of --poses and --orbit");
-    gn_wire_set_string(t->message.object, sizeof(t->message.object), name);
+    gn_wire_set_string(t->message.object, sizeof(t->message.object),
+                       gn_options_get_string(options, NULL, NULL, "object"));
+    t->replay.program = &program;
+    t->replay.rate_hz = path ? 0 : 60;
     if (gn_options_is_set(options, NULL, NULL, "rate"))
-        t->rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
-    if (gn_options_is_set(options, NULL, NULL, "count"))
-        t->n_wanted = (long)gn_options_get_int(options, NULL, NULL, "count");
+        t->replay.rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
+    t->replay.n_wanted = (long)gn_options_get_int(options, NULL, NULL, "count");
     if (path)
         return read_poses(t, path, out_error);
     t->orbit_m = gn_options_get_double(options, NULL, NULL, "orbit");
-    t->rate_hz = t->rate_hz > 0 ? t->rate_hz : 60;
     return 0;
+}
+
+/** Runs with sensible options; the exit status. */
+static int run(struct track *t, const struct gn_options *options)
+{
+    struct gn_error error = {0};
+    struct gn_replay *r = &t->replay;
+    gn_cmd_catch_signals();
+    int rc = prepare(t, options, &error);
+    if (rc == 0)
+        rc = gn_cmd_connect(&program, options, GN_MSG_ROLE_TRACKER, &r->client, &error);
+    if (rc == 0) {
+        r->clock_ns = gn_client_now_ns();
+        rc = send_all(t, &error);
+    }
+    bool is_done = rc == 0 || (rc == -EINTR && !t->poses && r->n_wanted == 0); // an orbit's end
+    if (!is_done)
+        gn_cmd_fail(&program, rc == -EINTR ? "interrupted" : error.text);
+    if (r->client && (is_done || rc == -EINTR)) {
+        printf("%ld poses sent", r->n_sent);
+        gn_replay_print_shift(r);
+        printf("\n");
+    }
+    gn_cmd_disconnect(&r->client);
+    free(t->poses);
+    return is_done ? 0 : 1;
 }
 
 int gn_cmd_track(int argc, char *const argv[])
 {
     struct gn_options *options = NULL;
     struct track t = {0};
-    struct gn_error error = {0};
     int rc = gn_cmd_load(&program, argc, argv, &options);
     if (rc <= 0)
         return rc < 0 ? 2 : 0;
-    gn_cmd_catch_signals();
-    rc = prepare(&t, options, &error);
-    if (rc == 0)
-        rc = gn_cmd_connect(&program, options, GN_MSG_ROLE_TRACKER, &t.client, &error);
-    if (rc == 0)
-        rc = send_all(&t, &error);
-    bool is_done = rc == 0 || (rc == -EINTR && !t.poses && t.n_wanted == 0); // an orbit's end
-    if (!is_done)
-        gn_cmd_fail(&program, error.text);
-    if (t.client && (is_done || rc == -EINTR))
-        printf("%ld poses sent\n", t.n_sent);
-    gn_cmd_disconnect(&t.client);
+    const char *misuse = find_misuse(options, &t.message);
+    int status = 2;
+    if (misuse)
+        gn_cmd_fail(&program, misuse);
+    else
+        status = run(&t, options);
     gn_options_destroy(&options);
-    free(t.poses);
-    return is_done ? 0 : 1;
+    return status;
 }

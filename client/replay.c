@@ -108,6 +108,11 @@ int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
     return serve_until(r, gn_replay_get_due_ns(r, capture), out_error);
 }
 
+int gn_replay_wait_last(struct gn_replay *r, struct gn_error *out_error)
+{
+    return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
+}
+
 static int stream(const struct gn_replay_command *command, struct gn_replay *r,
                   struct gn_error *out_error)
 {
@@ -122,10 +127,7 @@ static int stream(const struct gn_replay_command *command, struct gn_replay *r,
         if (err)
             return err;
     }
-    if (command->end)
-        return command->end(r, out_error);
-    // An ERROR about the last picture is on its way, if there is one.
-    return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
+    return command->end ? command->end(r, out_error) : gn_replay_wait_last(r, out_error);
 }
 
 /** Runs with everything open; the exit status. */

@@ -123,6 +123,10 @@ GN_MUST_USE int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_e
 GN_MUST_USE int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
                                struct gn_error *out_error);
 
+/** Serves it for 200 ms more: an ERROR about the last picture is on its way, if there is one. Same
+ * returns. */
+GN_MUST_USE int gn_replay_wait_last(struct gn_replay *r, struct gn_error *out_error);
+
 /** ", N s behind schedule" to stdout where it was shifted. */
 void gn_replay_print_shift(const struct gn_replay *r);
 

@@ -8,6 +8,7 @@ usage: server_objects.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -216,9 +217,22 @@ def test_the_track_command():
         for arguments, word in (((), '--poses'), (('--poses', path, '--orbit', '1'), '--orbit'),
                                 (('--poses', '/nowhere'), '/nowhere')):
             status, out, err = run_track(daemon, '--object', 'cube', *arguments)
-            assert status != 0 and word in err, (arguments, err)
+            assert status == (1 if '/nowhere' in arguments else 2) and word in err, (arguments, err)
+
+
+def test_a_tracker_that_slept_does_not_hurry():
+    with open_room() as daemon:
+        track = subprocess.Popen([GNOMON, 'track', '--server', '%s:%d' % daemon.address, '--object',
+                                  'cube', '--orbit', '1', '--rate', '20', '--count', '30'],
+                                 stdout=subprocess.PIPE, text=True)
+        wait_for(daemon, 'poses_in', 1)
+        track.send_signal(signal.SIGSTOP)
+        time.sleep(3)
+        track.send_signal(signal.SIGCONT)
+        out, _ = track.communicate(timeout=60)
+        assert track.returncode == 0 and '30 poses sent, ' in out and 'behind schedule' in out, out
 
 
 run_tests([test_the_object_and_its_shadow_move, test_the_status_says_who_moves_what,
            test_the_newest_capture_wins, test_bad_poses_move_nothing, test_a_flood_of_poses,
-           test_the_track_command])
+           test_the_track_command, test_a_tracker_that_slept_does_not_hurry])
