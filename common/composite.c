@@ -12,6 +12,7 @@
 #include "common/encoder.h"
 #include "common/noise.h"
 #include "common/point_spread.h"
+#include "common/vec4.h"
 
 /* Rows that one worker takes at a time; more where each strip has neighbours to read besides. */
 #define ROWS 16
@@ -19,21 +20,6 @@
 /* Pixels that are worked on side by side, and their values. */
 #define BLOCK 16
 #define VALUES (3 * BLOCK)
-
-typedef float vec4 __attribute__((vector_size(16)));
-typedef int32_t mask4 __attribute__((vector_size(16)));
-
-static vec4 load(const float *at)
-{
-    vec4 v;
-    memcpy(&v, at, sizeof(v));
-    return v;
-}
-
-static void store(float *at, vec4 v)
-{
-    memcpy(at, &v, sizeof(v));
-}
 
 struct gn_compositor {
     struct gn_pool *pool; // borrowed, may be NULL
@@ -79,10 +65,10 @@ struct block {
 /* True where all n values, which stand one after the other, are the value. */
 static bool are_all(const float *values, int n, float value)
 {
-    mask4 is_other = {0};
+    gn_mask4 is_other = {0};
     for (int i = 0; i < n; i += 4)
-        is_other |= load(values + i) != value;
-    return (is_other[0] | is_other[1] | is_other[2] | is_other[3]) == 0;
+        is_other |= gn_vec4_load(values + i) != value;
+    return !gn_mask4_has_any(is_other);
 }
 
 /* Whether the whole block from x on keeps its bits, quickly. */
@@ -135,10 +121,10 @@ static bool is_untouched(const struct block *b, int i)
 static void blend_diagonal(const struct job *job, struct block *b)
 {
     for (int i = 0; i < VALUES; i += 4) {
-        vec4 v = load(b->base + i) * load(b->factor + i) +
-                 load(b->light + i) * load(job->gains + i % 12);
-        mask4 is_positive = v > 0;
-        store(b->rgb + i, (vec4)((mask4)v & is_positive)); // NaN to 0, too
+        gn_vec4 v = gn_vec4_load(b->base + i) * gn_vec4_load(b->factor + i) +
+                    gn_vec4_load(b->light + i) * gn_vec4_load(job->gains + i % 12);
+        gn_mask4 is_positive = v > 0;
+        gn_vec4_store(b->rgb + i, (gn_vec4)((gn_mask4)v & is_positive)); // NaN to 0, too
     }
 }
 

@@ -8,11 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/vec4.h"
+
 /* Of V and A, L, G. */
 static const int channels[GN_SPREAD_PARTS] = {4, 3, 3};
 
-/* Four floats at a time; every array ends in this many spare floats. */
-typedef float vec4 __attribute__((vector_size(16)));
+/* Four floats are worked on at a time; every array ends in this many spare ones. */
 #define SPARE 4
 
 /*
@@ -89,18 +90,6 @@ static float *get_wide(const struct gn_spread *spread, int part, int row)
            (size_t)row * ((size_t)spread->width * (size_t)channels[part] + SPARE);
 }
 
-static vec4 load(const float *at)
-{
-    vec4 v;
-    memcpy(&v, at, sizeof(v));
-    return v;
-}
-
-static void store(float *at, vec4 v)
-{
-    memcpy(at, &v, sizeof(v));
-}
-
 /* One row's layers. shadow and added may be NULL. */
 struct source {
     const float *rgba, *shadow, *added;
@@ -109,12 +98,12 @@ struct source {
 /* First of n values that is not the value; n: all are. */
 static int find_other(const float *values, int n, float value)
 {
-    typedef int32_t mask4 __attribute__((vector_size(16)));
     int i = 0;
     for (; i + 16 <= n; i += 16) {
-        mask4 is_other = (load(values + i) != value) | (load(values + i + 4) != value) |
-                         (load(values + i + 8) != value) | (load(values + i + 12) != value);
-        if (is_other[0] | is_other[1] | is_other[2] | is_other[3])
+        gn_mask4 is_other =
+            (gn_vec4_load(values + i) != value) | (gn_vec4_load(values + i + 4) != value) |
+            (gn_vec4_load(values + i + 8) != value) | (gn_vec4_load(values + i + 12) != value);
+        if (gn_mask4_has_any(is_other))
             break;
     }
     while (i < n && values[i] == value)
@@ -176,10 +165,11 @@ static void spread_along(struct gn_spread *spread, const struct gn_spread_kernel
     const float *in = spread->packed + n * r;
     float *out = get_wide(spread, part, row) + n * span[0];
     for (int i = 0; i < n * (span[1] - span[0]); i += 4) {
-        vec4 sum = kernel->weights[0] * load(in + i);
+        gn_vec4 sum = kernel->weights[0] * gn_vec4_load(in + i);
         for (int k = 1; k <= r; k++)
-            sum += kernel->weights[k] * (load(in + i - n * k) + load(in + i + n * k));
-        store(out + i, sum);
+            sum +=
+                kernel->weights[k] * (gn_vec4_load(in + i - n * k) + gn_vec4_load(in + i + n * k));
+        gn_vec4_store(out + i, sum);
     }
 }
 
@@ -216,7 +206,7 @@ static void spread_across(struct gn_spread *spread, const struct gn_spread_kerne
         float weight = kernel->weights[abs(k - kernel->radius)];
         int at = n * span[0], stop = n * span[1];
         for (; at + 4 <= stop; at += 4)
-            store(out + at, load(out + at) + weight * load(in + at));
+            gn_vec4_store(out + at, gn_vec4_load(out + at) + weight * gn_vec4_load(in + at));
         for (; at < stop; at++)
             out[at] += weight * in[at];
     }

@@ -7,9 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/vec4.h"
 #include "server/light/luminance.h"
 #include "server/light/penrose.h"
-#include "server/light/vec4.h"
 
 /* log2 of GN_IMAGE_MAX_SIDE, and one for the whole. */
 enum { N_LEVELS_MAX = 16 };

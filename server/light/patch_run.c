@@ -8,9 +8,9 @@
 
 #include <math.h>
 
+#include "common/vec4.h"
 #include "server/light/luminance.h"
 #include "server/light/map_geometry.h"
-#include "server/light/vec4.h"
 
 static const double pi = 3.14159265358979323846;
 

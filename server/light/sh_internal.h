@@ -6,9 +6,9 @@
 
 #include <string.h>
 
+#include "common/vec4.h"
 #include "server/light/scratch.h"
 #include "server/light/sh.h"
-#include "server/light/vec4.h"
 
 /** The harmonics are polynomials of the direction times these. */
 extern const double gn_sh_factor[GN_SH_MAX];

@@ -1,19 +1,34 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /* Four floats side by side, and how three interleaved channels of four texels become such. */
-#ifndef GN_SERVER_LIGHT_VEC4_H
-#define GN_SERVER_LIGHT_VEC4_H
+#ifndef GN_COMMON_VEC4_H
+#define GN_COMMON_VEC4_H
 
+#include <stdbool.h>
+#include <stdint.h>
 #include <string.h>
 
 /** The language's operators work lane by lane. */
 typedef float gn_vec4 __attribute__((vector_size(16)));
+/** What comparing them gives: -1 or 0 in each lane. */
+typedef int32_t gn_mask4 __attribute__((vector_size(16)));
 
 static inline gn_vec4 gn_vec4_load(const float *at)
 {
     gn_vec4 v;
     memcpy(&v, at, sizeof(v));
     return v;
+}
+
+static inline void gn_vec4_store(float *at, gn_vec4 v)
+{
+    memcpy(at, &v, sizeof(v));
+}
+
+/** Whether any lane is. */
+static inline bool gn_mask4_has_any(gn_mask4 mask)
+{
+    return (mask[0] | mask[1] | mask[2] | mask[3]) != 0;
 }
 
 /** Four vectors [3] one after the other, as x, y and z. */
