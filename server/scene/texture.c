@@ -9,15 +9,25 @@
 
 #include "common/jpeg.h"
 #include "common/png.h"
-#include "server/scene/srgb_table.h"
+
+/** Linear values of the codes of R, G, B; of sRGB by IEC 61966-2-1. */
+static void fill_linear(struct gn_texture *texture)
+{
+    for (int i = 0; i < 256; i++) {
+        double x = i / 255.0;
+        if (texture->is_srgb)
+            x = x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+        texture->linear[i] = (float)x;
+    }
+}
 
 /** Linear value of a code of channel k. */
 static float decode(const struct gn_texture *texture, int k, uint8_t code)
 {
-    return texture->is_srgb && k < 3 ? gn_srgb_table[code] : (float)code / 255.0f;
+    return k < 3 ? texture->linear[code] : (float)code / 255.0f;
 }
 
-/** The nearest code; sRGB by search, since the table rises. */
+/** The nearest code; sRGB by search, since its curve rises. */
 static uint8_t encode(const struct gn_texture *texture, int k, float value)
 {
     if (!texture->is_srgb || k == 3)
@@ -26,7 +36,7 @@ static uint8_t encode(const struct gn_texture *texture, int k, float value)
     int hi = 255;
     while (lo < hi) { // the first code whose upper bound is not below the value
         int mid = (lo + hi) / 2;
-        if (0.5f * (gn_srgb_table[mid] + gn_srgb_table[mid + 1]) < value)
+        if (0.5f * (texture->linear[mid] + texture->linear[mid + 1]) < value)
             lo = mid + 1;
         else
             hi = mid;
@@ -108,6 +118,7 @@ int gn_texture_init(struct gn_texture *texture, const uint8_t *rgba, int width, 
         w = half_side(w);
         h = half_side(h);
     }
+    fill_linear(texture);
     memcpy(texture->levels[0], rgba, 4 * (size_t)width * (size_t)height);
     w = width;
     h = height;

@@ -27,7 +27,8 @@ enum gn_texture_wrap {
 /** Thread-safety: immutable after create. */
 struct gn_texture {
     int width, height;
-    bool is_srgb; // R, G, B are sRGB codes; else linear. Alpha is linear
+    bool is_srgb;      // R, G, B are sRGB codes; else linear. Alpha is linear
+    float linear[256]; // what the codes of R, G, B stand for
     int n_levels;
     uint8_t *levels[GN_TEXTURE_MAX_LEVELS]; // [max(1, height >> l)][max(1, width >> l)][4], owned
 };
