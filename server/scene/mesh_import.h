@@ -14,6 +14,10 @@ struct aiScene;
  * elements than the file has bytes, or with lists counted in 32 bits. 0 or a negative errno. */
 GN_MUST_USE int gn_mesh_check_ply_header(const char *path, struct gn_error *out_error);
 
+/** Where a normal of the file's is none (zero, not finite), the mean of the vertex's triangles.
+ * Returns 0 or -ENOMEM. */
+GN_MUST_USE int gn_mesh_mend_normals(struct gn_mesh *mesh);
+
 /**
  * glTF: the scene's materials and their pictures into *mesh, in the scene's order, and in
  * mesh->ignored what the file asks for that is not done, pictures that cannot be read among it.
