@@ -23,30 +23,9 @@ enum { FLOOR = 3, BALL = 5, BOX = 7, ROCK = 8 };
 static const double twice[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1};
 static const struct gn_pose at_rest = {{1, 0, 0, 0}, {0, 0, 0.5}};
 
-/** A real floor that rests, a virtual ball and a real box that move, a virtual rock that rests. */
-static struct gn_rt *make_source(void)
-{
-    double identity[16];
-    gn_mat4_identity(identity);
-    const double aside[16] = {1, 0, 0, 1.5, 0, 1, 0, 0, 0, 0, 1, 0.2, 0, 0, 0, 1};
-    struct gn_mesh floor = gn_test_make_plane(4.0f, 3);
-    struct gn_mesh ball = gn_test_make_sphere(0.25f, 12);
-    struct gn_mesh box = gn_test_make_cube(0.3f);
-    struct gn_rt *rt = NULL;
-    assert_int_equal(gn_rt_create(&rt, NULL), 0);
-    assert_int_equal(gn_rt_add_mesh(rt, GN_RT_REAL, FLOOR, &floor, identity, NULL), 0);
-    assert_int_equal(gn_rt_add_mesh(rt, GN_RT_VIRTUAL, ROCK, &box, aside, NULL), 0);
-    assert_int_equal(gn_rt_add_mover(rt, GN_RT_VIRTUAL, BALL, &ball, twice, &at_rest, NULL), 0);
-    assert_int_equal(gn_rt_add_mover(rt, GN_RT_REAL, BOX, &box, identity, &at_rest, NULL), 0);
-    assert_int_equal(gn_rt_commit(rt, NULL, NULL), 0);
-    gn_mesh_finish(&floor);
-    gn_mesh_finish(&ball);
-    gn_mesh_finish(&box);
-    return rt;
-}
-
-/** The same without movers: all where poses say. */
-static struct gn_rt *make_anew(const struct gn_pose poses[static 2])
+/** A real floor that rests, a virtual ball and a real box that move, a virtual rock that rests;
+ * where poses are given, nothing moves and they say where ball and box are. */
+static struct gn_rt *make_room(const struct gn_pose *poses)
 {
     double identity[16];
     double m[16];
@@ -59,11 +38,16 @@ static struct gn_rt *make_anew(const struct gn_pose poses[static 2])
     assert_int_equal(gn_rt_create(&rt, NULL), 0);
     assert_int_equal(gn_rt_add_mesh(rt, GN_RT_REAL, FLOOR, &floor, identity, NULL), 0);
     assert_int_equal(gn_rt_add_mesh(rt, GN_RT_VIRTUAL, ROCK, &box, aside, NULL), 0);
-    gn_pose_to_matrix(&poses[0], m);
-    gn_mat4_multiply(m, twice, m);
-    assert_int_equal(gn_rt_add_mesh(rt, GN_RT_VIRTUAL, BALL, &ball, m, NULL), 0);
-    gn_pose_to_matrix(&poses[1], m);
-    assert_int_equal(gn_rt_add_mesh(rt, GN_RT_REAL, BOX, &box, m, NULL), 0);
+    if (poses) {
+        gn_pose_to_matrix(&poses[0], m);
+        gn_mat4_multiply(m, twice, m);
+        assert_int_equal(gn_rt_add_mesh(rt, GN_RT_VIRTUAL, BALL, &ball, m, NULL), 0);
+        gn_pose_to_matrix(&poses[1], m);
+        assert_int_equal(gn_rt_add_mesh(rt, GN_RT_REAL, BOX, &box, m, NULL), 0);
+    } else {
+        assert_int_equal(gn_rt_add_mover(rt, GN_RT_VIRTUAL, BALL, &ball, twice, &at_rest, NULL), 0);
+        assert_int_equal(gn_rt_add_mover(rt, GN_RT_REAL, BOX, &box, identity, &at_rest, NULL), 0);
+    }
     assert_int_equal(gn_rt_commit(rt, NULL, NULL), 0);
     gn_mesh_finish(&floor);
     gn_mesh_finish(&ball);
@@ -121,7 +105,7 @@ static int count_differences(const struct gn_rt *a, const struct gn_rt *b, enum 
 static void test_posed_scene_is_as_one_built_anew(void **state)
 {
     (void)state;
-    struct gn_rt *source = make_source();
+    struct gn_rt *source = make_room(NULL);
     struct gn_rt *posed = NULL;
     assert_int_equal(gn_rt_create_posed(source, &posed, NULL), 0);
     uint64_t seed = 1;
@@ -132,7 +116,7 @@ static void test_posed_scene_is_as_one_built_anew(void **state)
             poses[1] = draw_pose(&seed);
             assert_int_equal(gn_rt_set_poses(posed, poses, NULL), 0);
         }
-        struct gn_rt *anew = make_anew(poses);
+        struct gn_rt *anew = make_room(poses);
         for (int set = GN_RT_REAL; set <= GN_RT_ALL; set++) {
             int n_moved = 0;
             int n = count_differences(posed, anew, (enum gn_rt_set)set, &seed, &n_moved);
@@ -148,7 +132,7 @@ static void test_posed_scene_is_as_one_built_anew(void **state)
 static void test_scenes_do_not_disturb_each_other(void **state)
 {
     (void)state;
-    struct gn_rt *source = make_source();
+    struct gn_rt *source = make_room(NULL);
     struct gn_rt *a = NULL;
     struct gn_rt *b = NULL;
     uint64_t seed = 2;
@@ -157,8 +141,8 @@ static void test_scenes_do_not_disturb_each_other(void **state)
     assert_int_equal(gn_rt_create_posed(source, &a, NULL), 0);
     assert_int_equal(gn_rt_create_posed(source, &b, NULL), 0);
     assert_int_equal(gn_rt_set_poses(a, poses, NULL), 0);
-    struct gn_rt *moved = make_anew(poses);
-    struct gn_rt *unmoved = make_anew(rest);
+    struct gn_rt *moved = make_room(poses);
+    struct gn_rt *unmoved = make_room(rest);
     int n_moved = 0;
     assert_true(count_differences(a, moved, GN_RT_ALL, &seed, &n_moved) <= 4);
     assert_true(count_differences(b, unmoved, GN_RT_ALL, &seed, &n_moved) <= 4);
@@ -172,10 +156,24 @@ static void test_scenes_do_not_disturb_each_other(void **state)
     gn_rt_destroy(&unmoved);
 }
 
+/** Ray i of a packet. */
+static void set_ray(struct gn_rt_packet *packet, int i, const float org[static 3],
+                    const float dir[static 3], float far)
+{
+    packet->org_x[i] = org[0];
+    packet->org_y[i] = org[1];
+    packet->org_z[i] = org[2];
+    packet->dir_x[i] = dir[0];
+    packet->dir_y[i] = dir[1];
+    packet->dir_z[i] = dir[2];
+    packet->t_far[i] = far;
+    packet->valid[i] = -1;
+}
+
 static void test_packets_agree_with_single_rays(void **state)
 {
     (void)state;
-    struct gn_rt *source = make_source();
+    struct gn_rt *source = make_room(NULL);
     struct gn_rt *rt = NULL;
     uint64_t seed = 3;
     assert_int_equal(gn_rt_create_posed(source, &rt, NULL), 0);
@@ -190,13 +188,7 @@ static void test_packets_agree_with_single_rays(void **state)
                 float org[3];
                 float dir[3];
                 draw_ray(&seed, org, dir);
-                packet.org_x[i] = org[0];
-                packet.org_y[i] = org[1];
-                packet.org_z[i] = org[2];
-                packet.dir_x[i] = dir[0];
-                packet.dir_y[i] = dir[1];
-                packet.dir_z[i] = dir[2];
-                packet.t_far[i] = i % 2 ? INFINITY : 0.8f;
+                set_ray(&packet, i, org, dir, i % 2 ? INFINITY : 0.8f);
                 packet.valid[i] = gn_test_random(&seed) % 4 ? -1 : 0;
                 if (packet.valid[i] &&
                     gn_rt_is_occluded(rt, (enum gn_rt_set)set, org, dir, 0.0f, packet.t_far[i]))
@@ -238,14 +230,7 @@ static void test_packets_to_one_light(void **state)
         for (int i = 0; i < GN_RT_PACKET; i++) {
             const float org[3] = {at[0] + 0.02f * (float)(i % 4), at[1] + 0.02f * (float)(i / 4),
                                   at[2]};
-            packet.org_x[i] = org[0];
-            packet.org_y[i] = org[1];
-            packet.org_z[i] = org[2];
-            packet.dir_x[i] = dir[0];
-            packet.dir_y[i] = dir[1];
-            packet.dir_z[i] = dir[2];
-            packet.t_far[i] = INFINITY;
-            packet.valid[i] = -1;
+            set_ray(&packet, i, org, dir, INFINITY);
             expected |= (uint32_t)gn_rt_is_occluded(rt, GN_RT_ALL, org, dir, 0.0f, INFINITY) << i;
         }
         assert_int_equal(gn_rt_get_occluded16(rt, GN_RT_ALL, &packet), expected);
@@ -259,14 +244,14 @@ static void test_packets_to_one_light(void **state)
 static void test_bounds_hold_what_moves(void **state)
 {
     (void)state;
-    struct gn_rt *source = make_source();
+    struct gn_rt *source = make_room(NULL);
     struct gn_rt *rt = NULL;
     uint64_t seed = 4;
     assert_int_equal(gn_rt_create_posed(source, &rt, NULL), 0);
     for (int round = 0; round < 20; round++) {
         const struct gn_pose poses[2] = {draw_pose(&seed), draw_pose(&seed)};
         assert_int_equal(gn_rt_set_poses(rt, poses, NULL), 0);
-        struct gn_rt *anew = make_anew(poses);
+        struct gn_rt *anew = make_room(poses);
         for (int set = GN_RT_REAL; set <= GN_RT_ALL; set++) {
             float a[2][3];
             float b[2][3];
@@ -286,7 +271,7 @@ static void test_bounds_hold_what_moves(void **state)
 static void test_what_is_no_place_is_refused(void **state)
 {
     (void)state;
-    struct gn_rt *source = make_source();
+    struct gn_rt *source = make_room(NULL);
     struct gn_rt *rt = NULL;
     struct gn_rt *again = NULL;
     struct gn_error error = {0};
