@@ -173,6 +173,9 @@ static void test_glass_splits_all_light(void **state)
             aim(cosines[c], &surface, dir);
             surface.is_front = side;
             gn_glass_split(&surface, dir, u, &back, &through);
+            double cos_t;
+            double share = gn_glass_get_fresnel(cosines[c], side ? 1.5 : 1 / 1.5, &cos_t);
+            assert_float_equal(back.weight[0], share, 1e-4); // the cosine is in float
             assert_float_equal(back.weight[0] + through.weight[0], 1, 1e-6);
             assert_float_equal(through.weight[2], 0.5 * through.weight[1], 1e-6);
             double sines[2] = {0}, cosine[2] = {0};
@@ -193,6 +196,65 @@ static void test_glass_splits_all_light(void **state)
     }
 }
 
+/** Lambda of Smith's function by the cosine. */
+static double get_lambda(double cosine, double alpha)
+{
+    return 0.5 * (sqrt(1 + alpha * alpha * (1 / (cosine * cosine) - 1)) - 1);
+}
+
+/** One facet's share of what rough glass reflects and lets through, per solid angle of facets. */
+static void add_facet(double cosine, double alpha, double ratio, double z, double phi,
+                      double out_sums[static 2])
+{
+    double sine = sqrt(1 - cosine * cosine), s = sqrt(1 - z * z), cos_t;
+    double along = sine * s * cos(phi) + cosine * z;
+    if (along <= 0)
+        return;
+    double fresnel = gn_glass_get_fresnel(fmin(along, 1), ratio, &cos_t);
+    double d = 1 + (alpha * alpha - 1) * z * z;
+    double seen = alpha * alpha / (M_PI * d * d) * along / cosine;
+    double reflected = 2 * along * z - cosine; // their z
+    double refracted = (along / ratio - cos_t) * z - cosine / ratio;
+    double lambda = get_lambda(cosine, alpha);
+    if (reflected > 0)
+        out_sums[0] += seen * fresnel / (1 + lambda + get_lambda(reflected, alpha));
+    if (cos_t > 0 && refracted < 0)
+        out_sums[1] += seen * (1 - fresnel) / ((1 + lambda) * (1 + get_lambda(refracted, alpha)));
+}
+
+/** Walter et al. 2007, eqs. 20 and 21, summed over all facets, against what is sampled. */
+static void test_rough_glass_is_the_sum_of_its_facets(void **state)
+{
+    (void)state;
+    static const double rough[] = {0.5, 0.8, 1};
+    enum { RINGS = 600 };
+    for (size_t i = 0; i < LENGTH(rough) * LENGTH(cosines) * 2; i++) {
+        bool is_front = i % 2;
+        double cosine = cosines[i / 2 % LENGTH(cosines)],
+               roughness = rough[i / 2 / LENGTH(cosines)];
+        double sums[2] = {0}, sampled[2] = {0};
+        struct gn_surface surface = {.material = GN_MATERIAL_GLASS,
+                                     .albedo = {1, 1, 1},
+                                     .roughness = (float)roughness,
+                                     .ior = 1.5f};
+        float dir[3];
+        aim(cosine, &surface, dir);
+        surface.is_front = is_front;
+        for (int j = 0; j < RINGS * RINGS; j++)
+            add_facet(cosine, roughness * roughness, is_front ? 1.5 : 1 / 1.5,
+                      (j / RINGS + 0.5) / RINGS, 2 * M_PI * (j % RINGS + 0.5) / RINGS, sums);
+        for (int j = 0; j < SIDE * SIDE; j++) {
+            const double u[2] = {(j / SIDE + 0.5) / SIDE, (j % SIDE + 0.5) / SIDE};
+            struct glass_ray back, through;
+            gn_glass_split(&surface, dir, u, &back, &through);
+            sampled[0] += back.weight[1] / (SIDE * SIDE);
+            sampled[1] += through.weight[1] / (SIDE * SIDE);
+        }
+        for (int k = 0; k < 2; k++)
+            assert_float_equal(sampled[k], sums[k] * 2 * M_PI / (RINGS * RINGS), 2e-3);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -201,6 +263,7 @@ int main(void)
         cmocka_unit_test(test_densities_add_up),
         cmocka_unit_test(test_fresnel_has_the_published_values),
         cmocka_unit_test(test_glass_splits_all_light),
+        cmocka_unit_test(test_rough_glass_is_the_sum_of_its_facets),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

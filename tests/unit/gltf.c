@@ -96,20 +96,28 @@ static int read_quad(const char *members, struct gn_mesh *out_mesh, struct gn_er
     return gn_mesh_read_file(gn_test_folder_get_path("q.gltf"), out_mesh, error);
 }
 
-/** The surface at (x, y) of the square, seen from +z or -z. */
-static void look(struct gn_mesh *mesh, float x, float y, float from, struct gn_surface *out)
+/** The surface at (x, y) of the square times scale_x, by a footprint of that many metres, seen from
+ * +z or -z. */
+static void look_at(struct gn_mesh *mesh, double scale_x, float footprint, float x, float y,
+                    float from, struct gn_surface *out)
 {
     struct gn_scene_object object = {.role = GN_RT_VIRTUAL, .mesh = *mesh};
     struct gn_scene *scene = NULL;
     struct gn_rt_hit hit;
     const float org[3] = {x, y, from}, dir[3] = {0, 0, from > 0 ? -1.0f : 1.0f};
     gn_mat4_identity(object.world_from_object);
+    object.world_from_object[0] = scale_x;
     assert_int_equal(gn_scene_create(&object, 1, NULL, &scene, NULL), 0);
     assert_true(gn_rt_intersect(scene->rt, GN_RT_ALL, org, dir, 0, INFINITY, &hit));
-    gn_scene_get_surface(scene, dir, &hit, out);
+    gn_scene_get_surface_filtered(scene, dir, &hit, footprint, out);
     *mesh = scene->objects[0].mesh; // back, for the next look
     memset(&scene->objects[0].mesh, 0, sizeof(*mesh));
     gn_scene_destroy(&scene);
+}
+
+static void look(struct gn_mesh *mesh, float x, float y, float from, struct gn_surface *out)
+{
+    look_at(mesh, 1, 0, x, y, from, out);
 }
 
 static float get_srgb(int code)
@@ -187,6 +195,42 @@ static void test_normal_maps_lean_as_painted(void **state)
     look(&mesh, 0.9f, 0.5f, -1, &s); // the same surface from behind
     assert_float_equal(s.normal_shading[1], -0.6f, 0.01);
     assert_float_equal(s.normal_shading[2], -0.8f, 0.01);
+    look(&mesh, 0.1f, 0.5f, -1, &s);
+    assert_float_equal(s.normal_shading[0], -0.6f, 0.01);
+    look_at(&mesh, -1, 0, -0.1f, 0.5f, 1, &s); // mirrored: only right and left change
+    assert_float_equal(s.normal_shading[0], -0.6f, 0.01);
+    look_at(&mesh, -1, 0, -0.9f, 0.5f, 1, &s);
+    assert_float_equal(s.normal_shading[1], 0.6f, 0.01);
+    assert_float_equal(s.normal_shading[2], 0.8f, 0.01);
+    gn_mesh_finish(&mesh);
+}
+
+/** What is as large as the picture sees its mean, what is between texel and picture a mixture. */
+static void test_footprints_choose_the_level(void **state)
+{
+    (void)state;
+    struct gn_mesh mesh = {0};
+    struct gn_error error;
+    struct gn_surface s;
+    const uint8_t black[3] = {0, 0, 0}, white[3] = {255, 255, 255};
+    write_picture("color.png", black, white);
+    assert_int_equal(read_quad("\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{"
+                               "\"index\":0}}}],\"textures\":[{\"source\":0,\"sampler\":0}],"
+                               "\"samplers\":[{\"wrapS\":33071,\"wrapT\":33071}],"
+                               "\"images\":[{\"uri\":\"color.png\"}]",
+                               &mesh, &error),
+                     0);
+    // 2 x 1 texels on 1 m^2 (4 m^2 below): a side of 1 m is that of sqrt(2) texels, level 1/2.
+    static const struct {
+        double scale_x;
+        float footprint, albedo;
+    } known[] = {{1, 0, 0},    {1, 0.5f, 0},    {1, 1, 0.25f},
+                 {1, 2, 0.5f}, {1, 1e9f, 0.5f}, {4, 2, 0.25f}};
+    for (size_t i = 0; i < LENGTH(known); i++) {
+        look_at(&mesh, known[i].scale_x, known[i].footprint, 0.1f * (float)known[i].scale_x, 0.5f,
+                1, &s);
+        assert_float_equal(s.albedo[0], known[i].albedo, 0.003); // codes of 8 bits
+    }
     gn_mesh_finish(&mesh);
 }
 
@@ -448,6 +492,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_factors_times_pictures),
         cmocka_unit_test(test_normal_maps_lean_as_painted),
+        cmocka_unit_test(test_footprints_choose_the_level),
         cmocka_unit_test(test_rays_pass_where_alpha_is_low),
         cmocka_unit_test(test_numbers_beside_the_pictures),
         cmocka_unit_test(test_a_picture_without_permission),

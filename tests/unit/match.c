@@ -180,6 +180,20 @@ static void test_camera_pixels_stay(void **state)
     gn_image8_finish(&out);
 }
 
+static void test_deviates(void **state)
+{
+    (void)state;
+    struct gn_noise noise;
+    double sums[5] = {0};
+    gn_noise_init(&noise);
+    for (int i = 0; i < GN_NOISE_VALUES; i++)
+        for (int k = 0; k < 5; k++)
+            sums[k] += pow((double)noise.deviate[i], k) / GN_NOISE_VALUES;
+    assert_true(fabs(sums[1]) < 1e-7 && fabs(sums[3]) < 1e-6);
+    assert_true(fabs(sums[2] - 1) < 1e-6);
+    assert_true(fabs(sums[4] - 3) < 0.05); // the tails end at 3.6
+}
+
 /* A camera's noise: of a mean, with the match's slope and offset. */
 static double photograph(const struct gn_match *match, int c, double mean, uint32_t *seed)
 {
@@ -328,6 +342,7 @@ int main(void)
         cmocka_unit_test(test_kernel),
         cmocka_unit_test_setup_teardown(test_blur_is_of_the_picture, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_camera_pixels_stay, set_up, tear_down),
+        cmocka_unit_test(test_deviates),
         cmocka_unit_test_setup_teardown(test_noise, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_noise_is_of_the_frame, set_up, tear_down),
         cmocka_unit_test(test_refusals),
