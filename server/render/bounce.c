@@ -61,21 +61,6 @@ static void sample_cosine(const float n[static 3], uint64_t *random, float out_d
         out_dir[k] = (float)(d[k] / sqrt(length2));
 }
 
-/** A light with probability proportional to its luminance. */
-static int choose_light(const struct light_list *lights, double u)
-{
-    int lo = 0;
-    int hi = lights->n - 1;
-    while (lo < hi) {
-        int mid = lo + (hi - lo) / 2;
-        if (lights->cdf[mid] > u)
-            hi = mid;
-        else
-            lo = mid + 1;
-    }
-    return lo;
-}
-
 /** One walk. */
 struct walk {
     struct gn_surface surface; // of ggx: the albedo is the base's
@@ -83,10 +68,12 @@ struct walk {
     float org[3];
     float dir[3];
     double through[3];
-    double pdf;       // 1/sr, of dir where it is specular; INFINITY: no other way leads there
-    int n_bounces;    // diffuse reflections
-    bool is_touched;  // a virtual surface has had a part
-    bool is_specular; // dir came of a mirror, glass or ggx reflection
+    double pdf;          // 1/sr, of dir where it is specular; INFINITY: no other way leads there
+    int n_bounces;       // diffuse reflections
+    bool is_touched;     // a virtual surface has had a part
+    bool skips_caustics; // caustics come to its start by photons
+    bool is_clear;       // since its last diffuse reflection it met but mirrors and glass
+    bool is_specular;    // dir came of a mirror, glass or ggx reflection
 };
 
 /** Adds radiance times the walk's share. */
@@ -115,7 +102,7 @@ static void try_light(const struct frame *frame, const struct walk *walk, enum g
     const struct light_list *lights = frame->lights;
     if (lights->n_lit == 0)
         return;
-    int l = choose_light(lights, next_unit(random));
+    int l = gn_render_lights_choose(lights, next_unit(random));
     double probability = lights->cdf[l] - (l > 0 ? lights->cdf[l - 1] : 0);
     const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
     float c = surface_cosine(&walk->surface, dir);
@@ -230,6 +217,9 @@ static void try_lamps(const struct frame *frame, struct walk *walk, enum gn_rt_s
 /** What the walk, going on from specular reflection, sees past all surfaces. */
 static void add_map(const struct frame *frame, const struct walk *walk, double sums[static 2][3])
 {
+    if (walk->skips_caustics && walk->n_bounces == 1 && walk->is_clear &&
+        walk->surface.role == GN_RT_VIRTUAL)
+        return;
     float radiance[3];
     double share = 1;
     gn_blend_get_radiance(&frame->blend, walk->surface.point, walk->dir, radiance);
@@ -309,6 +299,7 @@ static bool leave_ggx(struct walk *walk, const double u[static 2], double probab
 {
     double weight[3];
     walk->is_specular = true;
+    walk->is_clear = false;
     if (!gn_ggx_sample(&walk->ggx, u, walk->dir, weight, &walk->pdf) ||
         !(dot3(walk->dir, walk->surface.normal_horizon) > 0))
         return false;
@@ -362,6 +353,7 @@ static bool leave_diffuse(const struct frame *frame, struct walk *walk, uint64_t
     for (int k = 0; k < 3; k++)
         walk->through[k] *= walk->surface.albedo[k] / probability;
     walk->is_specular = false;
+    walk->is_clear = true;
     return true;
 }
 
@@ -417,6 +409,7 @@ void gn_bounce_gather(const struct frame *frame, const struct sample *start, enu
     for (int i = 0; i < n_paths; i++) {
         struct walk walk = start_walk(start);
         uint64_t random = next_random(&state);
+        walk.skips_caustics = start->has_photons;
         if (leave_diffuse(frame, &walk, &random, 1))
             take_walk(frame, &walk, set, &random, sums, rays);
     }

@@ -31,6 +31,8 @@
 #define CLUSTER_TRIANGLES 64
 /** Most outlines of both sets. */
 #define MAX_OUTLINES (2 * MAX_CLUSTERS * CLUSTER_TRIANGLES * 3)
+/** Bits of 1 << material: what is seen through or in them, not on them. */
+#define CLEAR_MATERIALS (1u << GN_MATERIAL_MIRROR | 1u << GN_MATERIAL_GLASS)
 /** Directions of a group: 16 blocks of 16. */
 #define GROUP (LANES * LANES)
 
@@ -66,6 +68,7 @@ struct sample {
     bool is_receiver; // a diffuse real surface
     bool is_cut;      // some light is cut off by a virtual object
     bool is_summed;   // base and lost are known
+    bool has_photons; // caustics come here by photons, not by walks
     double open[3], cut[3];
     double base[3], lost[3], gain[3];
     uint32_t shown; // 1 + the virtual object that a real mirror or glass shows here; 0: none
@@ -299,8 +302,11 @@ struct frame {
     bool run_shadow;   // shadow on real surfaces
     bool run_blockers; // real geometry may hide lights from real surfaces
     bool run_bounces;
-    bool run_optics; // real mirrors and glass show virtual objects and their shadows
-    bool cull;       // leave out rays that cannot meet the virtual objects
+    bool run_optics;   // real mirrors and glass show virtual objects and their shadows
+    bool run_caustics; // light of virtual mirrors and glass comes by photons
+    bool cull;         // leave out rays that cannot meet the virtual objects
+
+    uint64_t n_photons, rays_caustics; // after the pass: photons that the camera sees
 
     struct gn_layers *layers;
     struct feature *features;     // [h][w]
@@ -568,6 +574,8 @@ void gn_render_lights_pad(struct light_list *list, int multiple);
  * each probe has its share, the brightest, which stand for all its light. */
 GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list,
                                             struct placed_lights *placed);
+/** The light that u in [0, 1) chooses by luminance, where cdf is filled and some light is lit. */
+int gn_render_lights_choose(const struct light_list *list, double u);
 /** Sets the weights of samples that see a surface. */
 void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n);
 

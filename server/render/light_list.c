@@ -161,6 +161,20 @@ int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list 
     return 0;
 }
 
+int gn_render_lights_choose(const struct light_list *list, double u)
+{
+    int lo = 0;
+    int hi = list->n - 1;
+    while (lo < hi) {
+        int mid = lo + (hi - lo) / 2;
+        if (list->cdf[mid] > u)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    return lo;
+}
+
 void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n)
 {
     for (int i = 0; i < n && frame->blend.n > 1; i++) {

@@ -20,8 +20,8 @@
 
 #include "server/render/ggx.h"
 #include "server/render/glass.h"
+#include "server/render/random.h"
 
-#define CLEAR (1u << GN_MATERIAL_MIRROR | 1u << GN_MATERIAL_GLASS)
 /** Ends of one tree of ways, of which MAX_WAYS wait at one time; what is beyond sees the map. */
 #define MAX_ENDS 32
 #define MAX_WAYS 16
@@ -67,7 +67,7 @@ struct tree {
 
 bool gn_optics_is_needed(const struct gn_scene *scene)
 {
-    return (scene->real_materials & CLEAR) != 0 && scene->n_virtual_triangles > 0;
+    return (scene->real_materials & CLEAR_MATERIALS) != 0 && scene->n_virtual_triangles > 0;
 }
 
 int gn_optics_reserve(const struct gn_scene *scene, struct scratch *scratches, int n_workers)
@@ -89,22 +89,13 @@ void gn_optics_finish(struct scratch *scratch)
 
 static bool is_clear(const struct gn_surface *surface)
 {
-    return (CLEAR >> surface->material & 1) != 0;
+    return (CLEAR_MATERIALS >> surface->material & 1) != 0;
 }
 
 static bool is_rough(const struct gn_surface *surface)
 {
     return surface->material == GN_MATERIAL_GLASS &&
            surface->roughness * surface->roughness >= (float)GGX_MIN_ALPHA;
-}
-
-/** In [0, 1): splitmix64, as bounce.c. */
-static double next_unit(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
 static void see_map(struct tree *tree, const struct way *way)
@@ -145,7 +136,7 @@ static void split(struct tree *tree, const struct gn_surface *surface, const str
         return;
     }
     struct glass_ray rays[2];
-    const double u[2] = {next_unit(&tree->random), next_unit(&tree->random)};
+    const double u[2] = {random_unit(&tree->random), random_unit(&tree->random)};
     gn_glass_split(surface, way->dir, u, &rays[0], &rays[1]);
     for (int i = 0; i < 2; i++) {
         if (i == 1)

@@ -16,13 +16,14 @@ enum line {
     NEAR,
     ADDED,
     OPTICS,
+    CAUSTICS,
     N_LINES
 };
 
 static const char *const pass_names[N_LINES] = {
     [PRIMARY] = "primary", [REFINE] = "refine", [SHADE] = "shade",       [MIRROR] = "mirror",
     [GLOSSY] = "glossy",   [SHADOW] = "shadow", [BLOCKERS] = "blockers", [NEAR] = "near",
-    [ADDED] = "added",     [OPTICS] = "optics",
+    [ADDED] = "added",     [OPTICS] = "optics", [CAUSTICS] = "caustics",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -144,11 +145,23 @@ static const char *why_not_near(const struct frame *frame, const char *no_virtua
 
 static const char *why_not_optics(const struct frame *frame)
 {
-    unsigned optics = 1u << GN_MATERIAL_MIRROR | 1u << GN_MATERIAL_GLASS;
     if (!frame->has_virtual)
         return "the scene has no virtual object";
-    if (!(frame->scene->real_materials & optics))
+    if (!(frame->scene->real_materials & CLEAR_MATERIALS))
         return "no mirror or glass among the real objects";
+    return NULL;
+}
+
+static const char *why_not_caustics(const struct frame *frame)
+{
+    if (frame->options.quality != GN_QUALITY_REFERENCE)
+        return "caustics are of the reference quality";
+    if (!has_virtual(frame, CLEAR_MATERIALS))
+        return "no mirror or glass among the virtual objects";
+    if (!frame->has_real)
+        return "the scene has no real object to receive one";
+    if (frame->lights->n_lit + frame->near.n == 0)
+        return "no distant light and no lamp";
     return NULL;
 }
 
@@ -199,12 +212,16 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
         frame->near.n_placed > 0
             ? "lights at finite places, modelled surfaces among them, are tried from each surface"
             : "lamps and emissive meshes are tried from each surface");
-    bool can_add = frame->run_bounces || frame->near.n_virtual > 0;
-    set_line(report, ADDED,
-             !can_add
-                 ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
-                 : no_shadow,
-             why_added(frame));
+    const char *no_caustics = options->no_shadow ? "not asked for" : why_not_caustics(frame);
+    frame->run_caustics = !no_caustics;
+    set_line(report, CAUSTICS, no_caustics,
+             "virtual mirrors or glass may throw light onto real ones");
+    bool can_add = frame->run_bounces || frame->near.n_virtual > 0 || frame->run_caustics;
+    const char *no_added =
+        !can_add ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
+        : frame->run_caustics ? NULL
+                              : no_shadow;
+    set_line(report, ADDED, no_added, why_added(frame));
     const char *no_optics = why_not_optics(frame);
     frame->run_optics = !no_optics;
     set_line(report, OPTICS, no_optics, "a real mirror or glass may show virtual objects");
@@ -233,6 +250,7 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
              "no near light reaches a virtual surface, or a real one by way of a virtual object");
     withdraw(report, SHADOW, sum->rays_shadow == 0,
              "no light's ray from a pixel comes near a virtual object");
+    withdraw(report, CAUSTICS, frame->n_photons == 0, "the camera sees none");
     withdraw(report, OPTICS, sum->n_optics == 0, "no real mirror or glass in view");
     withdraw(report, ADDED, sum->n_receivers == 0, "no diffuse real surface in view");
 }

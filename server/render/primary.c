@@ -98,6 +98,7 @@ static void take_hit(const struct frame *frame, struct sample *s, const struct g
     // A shadow is less light on a diffuse surface; real mirrors and glass show other things.
     s->is_receiver = s->kind == SAMPLE_REAL && (surface->material == GN_MATERIAL_DIFFUSE ||
                                                 surface->material == GN_MATERIAL_GGX);
+    s->has_photons = s->is_receiver && frame->run_caustics;
     figures->n_receivers += s->is_receiver;
 }
 

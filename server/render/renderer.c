@@ -10,8 +10,9 @@
 #include <string.h>
 
 #include "common/clock.h"
-#include "server/render/kernels/kernels.h"
+#include "server/render/caustics.h"
 #include "server/render/estimate.h"
+#include "server/render/kernels/kernels.h"
 #include "server/render/silhouette.h"
 
 #define DEFAULT_PATHS 256
@@ -39,6 +40,7 @@ struct gn_renderer {
     struct clusters clusters[2]; // real, virtual
     struct silhouettes silhouettes[2];
     struct estimate *estimate; // owned
+    struct caustics caustics;
 };
 
 int gn_renderer_create(const struct gn_scene *scene, struct gn_pool *pool,
@@ -104,6 +106,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     gn_render_lights_finish(&self->lights);
     gn_near_store_finish(&self->near);
     gn_places_finish(&self->places);
+    gn_caustics_finish(&self->caustics);
     free(self->rays);
     free(self->features);
     free(self->figures);
@@ -397,6 +400,9 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
 
     gn_tiles_render(&frame, renderer->pool);
+    ret = gn_caustics_add(&renderer->caustics, &frame, renderer->pool);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
     gn_report_fill(&frame, renderer->n_workers, &report);
     ret = gn_estimate_make(renderer->estimate, &frame, renderer->pool, &report);
     if (ret < 0)

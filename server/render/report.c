@@ -39,7 +39,7 @@ void gn_report_fill(const struct frame *frame, int n_workers, struct gn_render_r
     report->ms_shadow = 1e3 * sum.s_shadow / n_workers;
     report->rays_primary = sum.rays_primary;
     report->rays_mirror = sum.rays_mirror;
-    report->rays_shade = sum.rays_shade;
+    report->rays_shade = sum.rays_shade + frame->rays_caustics;
     report->rays_shadow = sum.rays_shadow;
     report->n_lights = frame->lights->n_lit + frame->places->n + frame->near.n;
     report->n_virtual_pixels = sum.n_virtual_pixels;
