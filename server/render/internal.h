@@ -12,6 +12,7 @@
 
 #include "server/light/blend.h"
 #include "server/render/kernels/kernels.h"
+#include "server/render/light_merge.h"
 #include "server/render/near.h"
 #include "server/render/render.h"
 
@@ -570,9 +571,10 @@ void gn_render_lights_add(struct light_list *list, const double dir[static 3],
                           const double irradiance[static 3]);
 /** Adds dark lights up to the next multiple. */
 void gn_render_lights_pad(struct light_list *list, int multiple);
-/** Fills list from the states' lights; dark ones are left out. Of more than GN_LIGHTS_MAX together
- * each probe has its share, the brightest, which stand for all its light. */
-GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list,
+/** Fills list from the states' lights; dark ones are left out. Of more than `limit` together (0:
+ * GN_LIGHTS_MAX) each probe has its share, merged from all its lights. */
+GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, int limit,
+                                            struct light_merge *merge, struct light_list *list,
                                             struct placed_lights *placed);
 /** The light that u in [0, 1) chooses by luminance, where cdf is filled and some light is lit. */
 int gn_render_lights_choose(const struct light_list *list, double u);

@@ -9,6 +9,9 @@
 
 #include "server/light/luminance.h"
 
+/** Lights from which on discs are spread over no more directions. */
+#define MANY 64
+
 int gn_render_lights_reserve(struct light_list *list, int64_t capacity)
 {
     list->n = list->n_lit = list->n_groups = 0;
@@ -70,13 +73,15 @@ void gn_render_lights_pad(struct light_list *list, int multiple)
     }
 }
 
-/** So many directions that a disc's are as strong as a light in 64, and no step of its shadow's
- * edge is coarser than an eighth. An even number; `spare`: how many more there may be. */
-static int count_directions(const struct gn_light *light, double share, int spare)
+/** So many directions that a disc's are as strong as a light in `limit`, and no step of its
+ * shadow's edge is coarser than an eighth (with few lights: half a light's share). An even number;
+ * `spare`: how many more there may be. */
+static int count_directions(const struct gn_light *light, double share, int limit, int spare)
 {
     if (!light->is_disc || !(light->angular_radius > 0))
         return 1;
-    int n = 2 * (int)fmin(fmax(ceil(32 * share), 4), 16);
+    double half = 0.5 * fmin(limit, MANY);
+    int n = 2 * (int)fmin(fmax(ceil(half * share), ceil(half / 8)), 16);
     return n - 1 <= spare ? n : 1;
 }
 
@@ -106,40 +111,35 @@ static void add_light(const struct gn_light *light, const double irradiance[stat
     }
 }
 
-/** Adds the state's first n lights; where those are not all, scaled to the sum of all. spare: how
- * many more directions discs may take. Those at a distance go to `placed` while it has room. */
-static void add_lights(const struct gn_lighting_state *state, int n, int spare,
-                       struct light_list *list, struct placed_lights *placed)
+/** Adds n lights of the state. limit: how many a frame has; spare: how many more directions discs
+ * may take. Those at a distance go to `placed` while it has room. */
+static void add_lights(const struct gn_lighting_state *state, const struct gn_light *lights, int n,
+                       int limit, int spare, struct light_list *list, struct placed_lights *placed)
 {
     double all[3] = {0};
-    double some[3] = {0};
-    for (int i = 0; i < state->n_lights; i++) {
-        for (int k = 0; k < 3; k++) {
-            all[k] += state->lights[i].irradiance[k];
-            some[k] += i < n ? state->lights[i].irradiance[k] : 0;
-        }
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < 3; k++)
+            all[k] += lights[i].irradiance[k];
     }
     double energy = gn_luminance_of_sum(all);
     for (int i = 0; i < n; i++) {
-        const struct gn_light *light = &state->lights[i];
-        double irradiance[3];
-        for (int k = 0; k < 3; k++)
-            irradiance[k] =
-                light->irradiance[k] * (n < state->n_lights && some[k] > 0 ? all[k] / some[k] : 1);
+        const struct gn_light *light = &lights[i];
+        const double irradiance[3] = {light->irradiance[0], light->irradiance[1],
+                                      light->irradiance[2]};
         if (gn_placed_add(placed, state, light, irradiance)) {
             for (int k = 0; k < 3; k++)
                 list->total[k] += irradiance[k];
             continue;
         }
         double share = energy > 0 ? gn_luminance_of_sum(irradiance) / energy : 0;
-        int n_directions = count_directions(light, share, spare);
+        int n_directions = count_directions(light, share, limit, spare);
         spare -= n_directions - 1;
         add_light(light, irradiance, n_directions, list);
     }
 }
 
-int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list *list,
-                                struct placed_lights *placed)
+int gn_render_lights_from_blend(const struct gn_blend *blend, int limit, struct light_merge *merge,
+                                struct light_list *list, struct placed_lights *placed)
 {
     int64_t n_all = 0;
     int ret = gn_render_lights_reserve(list, GN_LIGHTS_MAX);
@@ -149,12 +149,19 @@ int gn_render_lights_from_blend(const struct gn_blend *blend, struct light_list 
         return ret;
     for (int i = 0; i < blend->n; i++)
         n_all += blend->state[i]->n_lights;
+    limit = limit > 0 ? limit : GN_LIGHTS_MAX;
     int spare = n_all < GN_LIGHTS_MAX ? (int)(GN_LIGHTS_MAX - n_all) : 0;
     for (int i = 0; i < blend->n; i++) {
-        int n = blend->state[i]->n_lights;
-        int share = GN_LIGHTS_MAX / blend->n;
-        n = n_all > GN_LIGHTS_MAX && n > share ? share : n;
-        add_lights(blend->state[i], n, spare / blend->n, list, placed);
+        const struct gn_lighting_state *state = blend->state[i];
+        const struct gn_light *lights = state->lights;
+        int n = state->n_lights, share = limit > blend->n ? limit / blend->n : 1;
+        if (n_all > limit && n > share) {
+            n = gn_light_merge_make(merge, lights, n, share);
+            if (n < 0)
+                return n;
+            lights = merge->lights;
+        }
+        add_lights(state, lights, n, limit, spare / blend->n, list, placed);
         list->ends[i] = list->n;
         placed->ends[i] = placed->n;
     }

@@ -42,9 +42,13 @@ struct gn_render_options {
     bool single_ray;         // no pixel gets a grid (to compare light alone)
     bool estimate_error;     // the report's estimated_error: takes about 150 000 more rays
     bool supersample_all;    // every pixel gets its quality's grid (to test the choice of them)
-    int bounces;             // reference only: indirect bounces, [0, 16]
-    int paths_per_pixel;     // reference with bounces: random paths, [1, 65536], default 256
-    uint64_t seed;           // of the reference's random paths
+    int n_lights; // most lights of the lighting state, [1, GN_LIGHTS_MAX]; those that are more are
+                  // merged (light_merge.h); default: all. Not of the reference
+    int grid;     // rays per side of pixels that get a grid, [1, 4]; default: the quality's own.
+                  // Not of seed, which has none
+    int bounces;  // reference only: indirect bounces, [0, 16]
+    int paths_per_pixel; // reference with bounces: random paths, [1, 65536], default 256
+    uint64_t seed;       // of the reference's random paths
 };
 
 /** What of a lighting state the frames of a room can use; NULL: needed. Strings are static. */

@@ -18,6 +18,7 @@
 #define DEFAULT_PATHS 256
 #define MAX_PATHS 65536
 #define MAX_BOUNCES 16
+#define MAX_GRID 4
 
 struct gn_renderer {
     const struct gn_scene *scene; // borrowed
@@ -27,6 +28,7 @@ struct gn_renderer {
     int n_workers;
     struct scratch *scratches; // [n_workers], owned
     struct light_list lights;
+    struct light_merge merge;
     struct near_store near;
     struct places places;
     size_t n_pixels; // capacity of what follows
@@ -104,6 +106,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     }
     gn_blockers_finish(&self->blockers);
     gn_render_lights_finish(&self->lights);
+    gn_light_merge_finish(&self->merge);
     gn_near_store_finish(&self->near);
     gn_places_finish(&self->places);
     gn_caustics_finish(&self->caustics);
@@ -230,6 +233,12 @@ static int check_request(const struct gn_scene *scene, const struct gn_camera *c
         return gn_error_set(out_error, -EINVAL, "render: unknown quality %d", options->quality);
     if (options->shading < GN_SHADING_LIGHTS || options->shading > GN_SHADING_IRRADIANCE)
         return gn_error_set(out_error, -EINVAL, "render: unknown shading %d", options->shading);
+    if (options->n_lights < 0 || options->n_lights > GN_LIGHTS_MAX)
+        return gn_error_set(out_error, -EINVAL, "render: %d lights, must be 1 to %d",
+                            options->n_lights, GN_LIGHTS_MAX);
+    if (options->grid < 0 || options->grid > MAX_GRID)
+        return gn_error_set(out_error, -EINVAL, "render: a grid of %d rays, must be 1 to %d",
+                            options->grid, MAX_GRID);
     if (options->bounces < 0 || options->bounces > MAX_BOUNCES)
         return gn_error_set(out_error, -EINVAL, "render: %d bounces, must be 0 to %d",
                             options->bounces, MAX_BOUNCES);
@@ -311,6 +320,8 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->tiles_x = count_tiles(frame->camera->width);
     frame->tiles_y = count_tiles(frame->camera->height);
     frame->rule = gn_refine_rules[frame->options.quality];
+    if (frame->options.grid > 0 && frame->rule.grid > 1)
+        frame->rule.grid = frame->options.grid;
     if (frame->options.single_ray)
         frame->rule.grid = 1;
     if (frame->options.quality == GN_QUALITY_SEED)
@@ -342,9 +353,10 @@ static int make_silhouettes(struct gn_renderer *renderer, struct frame *frame)
 }
 
 static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
-                   const struct gn_blend *blend, enum gn_quality quality, struct gn_layers *layers,
-                   struct gn_error *out_error)
+                   const struct gn_blend *blend, const struct gn_render_options *options,
+                   struct gn_layers *layers, struct gn_error *out_error)
 {
+    bool is_reference = options->quality == GN_QUALITY_REFERENCE;
     int ret = 0;
     if (layers->width != camera->width || layers->height != camera->height) {
         gn_layers_finish(layers);
@@ -357,12 +369,12 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     if (ret == 0)
         ret = gn_places_reserve(&renderer->places, 0);
     if (ret == 0)
-        ret = quality == GN_QUALITY_REFERENCE
-                  ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
-                  : gn_render_lights_from_blend(blend, &renderer->lights, &renderer->near.placed);
-    if (ret == 0 && quality == GN_QUALITY_REFERENCE)
+        ret = is_reference ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
+                           : gn_render_lights_from_blend(blend, options->n_lights, &renderer->merge,
+                                                         &renderer->lights, &renderer->near.placed);
+    if (ret == 0 && is_reference)
         ret = reserve_texels(renderer);
-    if (ret == 0 && quality == GN_QUALITY_REFERENCE)
+    if (ret == 0 && is_reference)
         ret = reserve_places(renderer);
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
@@ -384,7 +396,7 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
     gn_blend_init(&frame.blend, light);
     int ret = check_request(renderer->scene, camera, &frame.blend, options, out_error);
     if (ret == 0)
-        ret = prepare(renderer, camera, &frame.blend, options->quality, layers, out_error);
+        ret = prepare(renderer, camera, &frame.blend, options, layers, out_error);
     if (ret < 0)
         return ret;
 

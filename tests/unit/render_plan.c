@@ -376,6 +376,10 @@ static void test_what_is_refused(void **state)
     refuse(&stage, &options, "reference quality only");
     options = (struct gn_render_options){.quality = GN_QUALITY_REFERENCE, .bounces = 17};
     refuse(&stage, &options, "17 bounces");
+    options = (struct gn_render_options){.n_lights = GN_LIGHTS_MAX + 1};
+    refuse(&stage, &options, "4097 lights");
+    options = (struct gn_render_options){.grid = 5};
+    refuse(&stage, &options, "grid of 5");
     options = (struct gn_render_options){.paths_per_pixel = -1};
     refuse(&stage, &options, "paths");
     options = (struct gn_render_options){.quality = (enum gn_quality)7};
