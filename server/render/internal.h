@@ -38,6 +38,7 @@
 #define GROUP (LANES * LANES)
 
 struct optics;
+struct pass;
 struct silhouette;
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
@@ -309,6 +310,7 @@ struct frame {
 
     uint64_t n_photons, rays_caustics; // after the pass: photons that the camera sees
 
+    const struct pass *pass; // NULL: a frame by itself; else its samples go into the pass' sums
     struct gn_layers *layers;
     struct feature *features;     // [h][w]
     struct tile_figures *figures; // [n_tiles]
@@ -341,9 +343,9 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
 
 /* primary.c */
 
-/** Fills table[h][w][3] and slopes; see struct frame. */
-void gn_primary_make_rays(const struct gn_camera *camera, struct gn_pool *pool, float *table,
-                          double out_slopes[static 4]);
+/** Fills table[h][w][3] and slopes; see struct frame. pass: NULL, or whose points of the pixels. */
+void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
+                          struct gn_pool *pool, float *table, double out_slopes[static 4]);
 /** The unit world direction of a camera direction. */
 void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
                     struct sample *sample);

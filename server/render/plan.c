@@ -119,7 +119,7 @@ static const char *why_not_shadow(const struct frame *frame)
         return "the scene has no real object to receive one";
     if (frame->lights->n + frame->places->n + frame->near.n == 0)
         return "no light";
-    if (!frame->run_bounces && frame->places->n == 0 && !can_any_light_cast(frame))
+    if (!frame->pass && !frame->run_bounces && frame->places->n == 0 && !can_any_light_cast(frame))
         return "no light throws a shadow of a virtual object onto a real one";
     return NULL;
 }

@@ -4,8 +4,11 @@
 
 #include <math.h>
 
+#include "server/render/pass.h"
+
 struct rays_job {
     const struct gn_camera *camera;
+    const struct pass *pass; // NULL: rays through the centres
     float *table;
 };
 
@@ -17,7 +20,10 @@ static void make_row(void *context, int y, int worker)
     float *row = job->table + (size_t)y * (size_t)camera->width * 3;
     for (int x = 0; x < camera->width; x++) {
         double dir[3];
-        if (!gn_camera_get_ray(camera, x + 0.5, y + 0.5, dir))
+        double at[2] = {0.5, 0.5};
+        if (job->pass)
+            gn_pass_get_point(job->pass, x, y, at);
+        if (!gn_camera_get_ray(camera, x + at[0], y + at[1], dir))
             dir[0] = dir[1] = dir[2] = 0;
         for (int k = 0; k < 3; k++)
             row[3 * x + k] = (float)dir[k];
@@ -66,10 +72,10 @@ static void bound_slopes(const struct gn_camera *camera, const float *table, dou
     }
 }
 
-void gn_primary_make_rays(const struct gn_camera *camera, struct gn_pool *pool, float *table,
-                          double out_slopes[static 4])
+void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
+                          struct gn_pool *pool, float *table, double out_slopes[static 4])
 {
-    struct rays_job job = {.camera = camera, .table = table};
+    struct rays_job job = {.camera = camera, .pass = pass, .table = table};
     gn_pool_run(pool, camera->height, make_row, &job);
     bound_slopes(camera, table, out_slopes);
 }

@@ -10,7 +10,7 @@
  * hard shadow: it is cut into parts. What the map does not show has the fill's radiance, on rings
  * of equal solid angle that begin at its rim.
  */
-#include "server/render/internal.h"
+#include "server/render/reference_lights.h"
 
 #include <math.h>
 #include <string.h>
@@ -198,10 +198,13 @@ static void add_texels(const struct gn_radiance_map *map, double total, bool is_
     gn_render_lights_pad(list, GROUP);
 }
 
-/** Adds a cell of what the map does not show; scale 0: only its solid angle counts. */
-static double add_cell(const struct gn_radiance_map *map, int ring, int sector, double scale,
-                       struct light_list *list, struct places *places)
+/** Cell i of a group of cells of the sphere, theta from the optical axis: its middle and solid
+ * angle; 0: the map shows it. */
+static double get_cell(const struct gn_radiance_map *map, int group, int i, double dir[static 3])
 {
+    int groups_x = FILL_SECTORS / 16;
+    int ring = group / groups_x * 16 + i / LANES / 4 * 4 + i % LANES / 4;
+    int sector = group % groups_x * 16 + i / LANES % 4 * 4 + i % LANES % 4;
     bool is_beyond = ring >= FILL_RINGS; // the rim
     double rim = cos(map->projection.theta_max);
     double along = (ring % FILL_RINGS + 0.5) / FILL_RINGS;
@@ -209,46 +212,65 @@ static double add_cell(const struct gn_radiance_map *map, int ring, int sector, 
     double z = is_beyond ? rim - (1 + rim) * along : 1 - (1 - rim) * along;
     double cell = 2 * M_PI * (is_beyond ? 1 + rim : 1 - rim) / (FILL_RINGS * FILL_SECTORS);
     double r = sqrt(fmax(0, 1 - z * z));
-    double dir[3] = {r * cos(phi), r * sin(phi), z};
     double xy[2];
-    if (gn_projection_get_position(&map->projection, dir, xy))
-        return 0;
-    double irradiance[3];
-    for (int k = 0; k < 3; k++)
-        irradiance[k] = map->fill[k] * cell * scale;
-    gn_pose_rotate(&map->world_from_probe, dir, dir);
-    if (scale > 0)
-        add_light(map, dir, cell * scale, irradiance, list, places);
-    return cell;
+    dir[0] = r * cos(phi);
+    dir[1] = r * sin(phi);
+    dir[2] = z;
+    return gn_projection_get_position(&map->projection, dir, xy) ? 0 : cell;
 }
 
-/** Cells of the sphere that the map does not show, theta from the optical axis; as the texels. */
+double gn_reference_get_fill_cell(const struct gn_radiance_map *map, int group, int i)
+{
+    double dir[3];
+    return get_cell(map, group, i, dir);
+}
+
+void gn_reference_add_fill_cell(const struct gn_radiance_map *map, int group, int i, double scale,
+                                struct light_list *list, struct places *places)
+{
+    double dir[3];
+    double irradiance[3];
+    double cell = get_cell(map, group, i, dir) * scale;
+    for (int k = 0; k < 3; k++)
+        irradiance[k] = map->fill[k] * cell;
+    gn_pose_rotate(&map->world_from_probe, dir, dir);
+    if (cell > 0)
+        add_light(map, dir, cell, irradiance, list, places);
+}
+
+static bool has_fill(const struct gn_radiance_map *map)
+{
+    return !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
+}
+
+double gn_reference_get_fill_scale(const struct gn_radiance_map *map)
+{
+    double sum = 0;
+    if (!has_fill(map))
+        return 0;
+    for (int group = 0; group < GN_FILL_GROUPS; group++) {
+        for (int i = 0; i < GROUP; i++)
+            sum += gn_reference_get_fill_cell(map, group, i);
+    }
+    return sum > 0 ? map->fill_solid_angle / sum : 0;
+}
+
+/** Cells of the sphere that the map does not show; as the texels. */
 static void add_fill(const struct gn_radiance_map *map, struct light_list *list,
                      struct places *places)
 {
-    // Two rounds: the cells' solid angles add up to the map's own figure of what is not shown.
-    double scale = 0;
-    for (int round = 0; round < 2; round++) {
-        double sum = 0;
-        for (int i = 0; i < 2 * FILL_RINGS * FILL_SECTORS; i++) {
-            int group = i / GROUP;
-            int block = i / LANES % LANES;
-            int lane = i % LANES;
-            int groups_x = FILL_SECTORS / 16;
-            int ring = group / groups_x * 16 + block / 4 * 4 + lane / 4;
-            int sector = group % groups_x * 16 + block % 4 * 4 + lane % 4;
-            sum += add_cell(map, ring, sector, scale, list, places);
-            if (lane == LANES - 1)
+    double scale = gn_reference_get_fill_scale(map);
+    for (int group = 0; group < GN_FILL_GROUPS; group++) {
+        for (int i = 0; i < GROUP; i++) {
+            gn_reference_add_fill_cell(map, group, i, scale, list, places);
+            if (i % LANES == LANES - 1)
                 gn_render_lights_pad(list, LANES);
-            if (block == LANES - 1 && lane == LANES - 1)
-                gn_render_lights_pad(list, GROUP);
         }
-        scale = sum > 0 ? map->fill_solid_angle / sum : 0;
+        gn_render_lights_pad(list, GROUP);
     }
 }
 
-/** The running sum of luminance, from 0 to 1. */
-static void fill_cdf(struct light_list *list)
+void gn_reference_fill_cdf(struct light_list *list)
 {
     double sum = 0;
     for (int i = 0; i < list->n; i++) {
@@ -261,22 +283,15 @@ static void fill_cdf(struct light_list *list)
         list->cdf[i] /= sum;
 }
 
-static bool has_fill(const struct gn_radiance_map *map)
-{
-    return !map->is_full_sphere && (map->fill[0] > 0 || map->fill[1] > 0 || map->fill[2] > 0);
-}
-
 /** Most lights of one map. */
 static int64_t get_capacity(const struct gn_radiance_map *map)
 {
     int64_t groups =
         (int64_t)((map->radiance.width + 15) / 16) * ((map->radiance.height + 15) / 16);
-    return groups * GROUP + MAX_PARTS + 2 * GROUP +
-           (has_fill(map) ? 2 * FILL_RINGS * FILL_SECTORS : 0);
+    return groups * GROUP + MAX_PARTS + 2 * GROUP + (has_fill(map) ? GN_FILL_GROUPS * GROUP : 0);
 }
 
-static void add_map(const struct gn_radiance_map *map, struct light_list *list,
-                    struct places *places)
+void gn_reference_sum_map(const struct gn_radiance_map *map, double out_total[static 3])
 {
     double total[3] = {0};
     for (size_t i = 0; i < (size_t)map->radiance.width * (size_t)map->radiance.height; i++) {
@@ -285,6 +300,22 @@ static void add_map(const struct gn_radiance_map *map, struct light_list *list,
         for (int k = 0; k < 3; k++)
             total[k] += irradiance[k];
     }
+    memcpy(out_total, total, sizeof(total));
+}
+
+void gn_reference_add_texel(const struct gn_radiance_map *map, int x, int y, double luminance,
+                            struct light_list *list, struct places *places)
+{
+    double irradiance[3];
+    get_texel_irradiance(map, (size_t)y * (size_t)map->radiance.width + (size_t)x, irradiance);
+    add_texel(map, x, y, count_parts(irradiance, luminance), list, places);
+}
+
+static void add_map(const struct gn_radiance_map *map, struct light_list *list,
+                    struct places *places)
+{
+    double total[3];
+    gn_reference_sum_map(map, total);
     double luminance = gn_luminance_of_sum(total);
     add_texels(map, luminance, false, list, places);
     add_texels(map, luminance, true, list, places);
@@ -313,7 +344,7 @@ int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *li
         places->ends[i] = places->n;
     }
     gn_directions_fill_groups(list);
-    fill_cdf(list);
+    gn_reference_fill_cdf(list);
     gn_places_fill_cdf(places);
     return 0;
 }

@@ -13,6 +13,7 @@
 #include "server/render/caustics.h"
 #include "server/render/estimate.h"
 #include "server/render/kernels/kernels.h"
+#include "server/render/pass.h"
 #include "server/render/silhouette.h"
 
 #define DEFAULT_PATHS 256
@@ -154,15 +155,19 @@ static int reserve_pixels(struct gn_renderer *renderer, int width, int height)
 }
 
 /** The table of rays depends on the intrinsics only. */
-static void update_rays(struct gn_renderer *renderer, const struct gn_camera *camera)
+static void update_rays(struct gn_renderer *renderer, const struct gn_camera *camera,
+                        const struct pass *pass)
 {
     const struct gn_camera *old = &renderer->rays_camera;
-    if (old->width == camera->width && old->height == camera->height && old->fx == camera->fx &&
-        old->fy == camera->fy && old->cx == camera->cx && old->cy == camera->cy &&
+    if (!pass && old->width == camera->width && old->height == camera->height &&
+        old->fx == camera->fx && old->fy == camera->fy && old->cx == camera->cx &&
+        old->cy == camera->cy &&
         memcmp(old->distortion, camera->distortion, sizeof(old->distortion)) == 0)
         return;
-    gn_primary_make_rays(camera, renderer->pool, renderer->rays, renderer->slopes);
+    gn_primary_make_rays(camera, pass, renderer->pool, renderer->rays, renderer->slopes);
     renderer->rays_camera = *camera;
+    if (pass)
+        renderer->rays_camera.fx = 0; // no camera's centres
 }
 
 static int reserve_texels(struct gn_renderer *renderer)
@@ -204,9 +209,15 @@ static const char *check_light(const struct gn_scene *scene, const struct gn_ble
     return NULL;
 }
 
-static int reserve_places(struct gn_renderer *renderer)
+static const struct places *get_places(const struct gn_renderer *renderer,
+                                       const struct frame *frame)
 {
-    int n = renderer->places.n;
+    return frame->pass ? frame->pass->places : &renderer->places;
+}
+
+static int reserve_places(struct gn_renderer *renderer, const struct places *places)
+{
+    int n = (int)places->capacity;
     for (int i = 0; i < renderer->n_workers; i++) {
         struct scratch *scratch = &renderer->scratches[i];
         if (scratch->n_places >= n)
@@ -312,8 +323,8 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->pixel_angle = (float)(1 / fmax(frame->camera->fx, frame->camera->fy));
     frame->kernels = gn_kernels_get();
     frame->rays = renderer->rays;
-    frame->lights = &renderer->lights;
-    frame->places = &renderer->places;
+    frame->lights = frame->pass ? frame->pass->lights : &renderer->lights;
+    frame->places = get_places(renderer, frame);
     frame->features = renderer->features;
     frame->figures = renderer->figures;
     frame->scratches = renderer->scratches;
@@ -352,13 +363,16 @@ static int make_silhouettes(struct gn_renderer *renderer, struct frame *frame)
     return 0;
 }
 
-static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
-                   const struct gn_blend *blend, const struct gn_render_options *options,
-                   struct gn_layers *layers, struct gn_error *out_error)
+/** Memory for the frame's picture, and its light. */
+static int prepare(struct gn_renderer *renderer, const struct frame *frame,
+                   struct gn_error *out_error)
 {
-    bool is_reference = options->quality == GN_QUALITY_REFERENCE;
+    const struct gn_camera *camera = frame->camera;
+    const struct gn_blend *blend = &frame->blend;
+    struct gn_layers *layers = frame->layers;
+    bool is_reference = frame->options.quality == GN_QUALITY_REFERENCE;
     int ret = 0;
-    if (layers->width != camera->width || layers->height != camera->height) {
+    if (layers && (layers->width != camera->width || layers->height != camera->height)) {
         gn_layers_finish(layers);
         ret = gn_layers_init(layers, camera->width, camera->height);
         if (ret < 0)
@@ -368,17 +382,57 @@ static int prepare(struct gn_renderer *renderer, const struct gn_camera *camera,
     ret = reserve_pixels(renderer, camera->width, camera->height);
     if (ret == 0)
         ret = gn_places_reserve(&renderer->places, 0);
-    if (ret == 0)
-        ret = is_reference ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
-                           : gn_render_lights_from_blend(blend, options->n_lights, &renderer->merge,
-                                                         &renderer->lights, &renderer->near.placed);
+    if (ret == 0 && !frame->pass)
+        ret = is_reference
+                  ? gn_reference_make_lights(blend, &renderer->lights, &renderer->places)
+                  : gn_render_lights_from_blend(blend, frame->options.n_lights, &renderer->merge,
+                                                &renderer->lights, &renderer->near.placed);
     if (ret == 0 && is_reference)
         ret = reserve_texels(renderer);
-    if (ret == 0 && is_reference)
-        ret = reserve_places(renderer);
+    if (ret == 0 && (is_reference || frame->pass))
+        ret = reserve_places(renderer, get_places(renderer, frame));
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
-    update_rays(renderer, camera);
+    update_rays(renderer, camera, frame->pass);
+    return 0;
+}
+
+/** One frame, or (frame->pass) one pass of many, whose layers stay as they are. */
+static int render_frame(struct gn_renderer *renderer, struct frame *frame,
+                        const struct gn_lighting_state *light, struct gn_render_report *out_report,
+                        struct gn_error *out_error)
+{
+    struct gn_render_report report = {0};
+    int64_t start_ns = gn_clock_get_monotonic_ns();
+    gn_blend_init(&frame->blend, light);
+    int ret =
+        check_request(renderer->scene, frame->camera, &frame->blend, &frame->options, out_error);
+    if (ret == 0)
+        ret = prepare(renderer, frame, out_error);
+    if (ret < 0)
+        return ret;
+
+    bool is_exact = frame->options.quality == GN_QUALITY_REFERENCE || frame->pass;
+    ret = gn_near_prepare(&renderer->near, renderer->scene, light, is_exact, &frame->near);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
+    init_frame(frame, renderer);
+    gn_plan_make(frame, renderer->slopes, &report);
+    ret = make_silhouettes(renderer, frame);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
+    report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
+
+    gn_tiles_render(frame, renderer->pool);
+    ret = frame->pass ? 0 : gn_caustics_add(&renderer->caustics, frame, renderer->pool);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
+    gn_report_fill(frame, renderer->n_workers, &report);
+    ret = gn_estimate_make(renderer->estimate, frame, renderer->pool, &report);
+    if (ret < 0)
+        return gn_error_set(out_error, ret, "render: out of memory");
+    report.ms_total = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
+    *out_report = report;
     return 0;
 }
 
@@ -387,39 +441,20 @@ int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *cam
                        const struct gn_render_options *options, struct gn_layers *layers,
                        struct gn_render_report *out_report, struct gn_error *out_error)
 {
-    static const struct gn_render_options defaults = {0};
-    struct gn_render_report report = {0};
-    int64_t start_ns = gn_clock_get_monotonic_ns();
-    if (!options)
-        options = &defaults;
-    struct frame frame = {.camera = camera, .options = *options, .layers = layers};
-    gn_blend_init(&frame.blend, light);
-    int ret = check_request(renderer->scene, camera, &frame.blend, options, out_error);
-    if (ret == 0)
-        ret = prepare(renderer, camera, &frame.blend, options, layers, out_error);
-    if (ret < 0)
-        return ret;
+    struct frame frame = {.camera = camera, .layers = layers};
+    if (options)
+        frame.options = *options;
+    return render_frame(renderer, &frame, light, out_report, out_error);
+}
 
-    bool is_reference = options->quality == GN_QUALITY_REFERENCE;
-    ret = gn_near_prepare(&renderer->near, renderer->scene, light, is_reference, &frame.near);
-    if (ret < 0)
-        return gn_error_set(out_error, ret, "render: out of memory");
-    init_frame(&frame, renderer);
-    gn_plan_make(&frame, renderer->slopes, &report);
-    ret = make_silhouettes(renderer, &frame);
-    if (ret < 0)
-        return gn_error_set(out_error, ret, "render: out of memory");
-    report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
-
-    gn_tiles_render(&frame, renderer->pool);
-    ret = gn_caustics_add(&renderer->caustics, &frame, renderer->pool);
-    if (ret < 0)
-        return gn_error_set(out_error, ret, "render: out of memory");
-    gn_report_fill(&frame, renderer->n_workers, &report);
-    ret = gn_estimate_make(renderer->estimate, &frame, renderer->pool, &report);
-    if (ret < 0)
-        return gn_error_set(out_error, ret, "render: out of memory");
-    report.ms_total = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
-    *out_report = report;
-    return 0;
+int gn_renderer_add_pass(struct gn_renderer *renderer, const struct gn_camera *camera,
+                         const struct gn_lighting_state *light,
+                         const struct gn_render_options *options, const struct pass *pass,
+                         struct gn_render_report *out_report, struct gn_error *out_error)
+{
+    struct frame frame = {.camera = camera, .options = *options, .pass = pass};
+    frame.options.shading = GN_SHADING_LIGHTS;
+    frame.options.single_ray = true;
+    frame.options.estimate_error = false;
+    return render_frame(renderer, &frame, light, out_report, out_error);
 }

@@ -18,6 +18,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "server/render/pass.h"
 #include "server/render/silhouette.h"
 
 /** Is some of the box less than the margin above the tangent plane of one of the receivers? */
@@ -257,7 +258,7 @@ void gn_shadow_find_groups(const struct frame *frame, const struct sample *sampl
 {
     memset(out_groups, 0, BATCH * sizeof(*out_groups));
     for (int i = 0; i < n; i++) {
-        if (samples[i].is_cut || frame->run_bounces)
+        if (samples[i].is_cut || frame->run_bounces || frame->pass)
             out_groups[samples[i].group] = true;
     }
 }
@@ -300,7 +301,7 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
     for (int i = 0; i < n; i++)
         gn_shadow_clear(&scratch->samples[i]);
     list_lights(frame, scratch, n);
-    if (scratch->n_shadow_lights == 0 && frame->near.n == 0)
+    if (scratch->n_shadow_lights == 0 && frame->near.n == 0 && !frame->pass)
         return;
     gn_receivers_begin(r);
     for (int i = 0; i < n; i++) {
@@ -316,7 +317,7 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         r->wanted[b] = 0;
     }
     find_cut(frame, scratch, figures);
-    if (frame->near.n > 0)
+    if (frame->near.n > 0 && !frame->pass)
         gn_near_find_cut(frame, scratch, figures);
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
     bool is_any_wanted = false;
@@ -329,13 +330,15 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         return;
     if (frame->run_blockers)
         find_hidden(frame, scratch, figures);
-    if (frame->run_blockers && frame->near.n_real > 0)
+    if (frame->run_blockers && frame->near.n_real > 0 && !frame->pass)
         gn_near_find_hidden(frame, scratch, figures);
     for (int b = 0; b < r->n_blocks; b++) {
         if (r->wanted[b])
             sum_block(frame, scratch, b);
     }
-    if (frame->near.n > 0)
+    if (frame->pass)
+        gn_pass_light_receivers(frame, scratch, n, figures);
+    else if (frame->near.n > 0)
         gn_near_sum(frame, scratch, figures);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];

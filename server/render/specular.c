@@ -321,7 +321,7 @@ void gn_specular_shade(const struct frame *frame, struct scratch *scratch, int n
         if (s->surface.material != GN_MATERIAL_GGX && s->surface.material != GN_MATERIAL_GLASS)
             continue;
         figures->n_glossy++;
-        if (frame->options.quality == GN_QUALITY_REFERENCE)
+        if (frame->options.quality == GN_QUALITY_REFERENCE || frame->pass)
             shade_by_walks(frame, s, n_paths, figures);
         else
             shade_by_tree(frame, scratch, s, n_directions, figures);

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "server/render/pass.h"
 
 static void init_sample(const struct frame *frame, struct sample *sample, int x, int y, int part)
 {
@@ -30,7 +31,9 @@ void gn_tiles_light_samples(const struct frame *frame, struct scratch *scratch, 
         gn_reference_shade(frame, scratch, n, n_paths, figures);
     else
         gn_shade_samples(frame, scratch, n, figures);
-    if (!is_reference && frame->near.n > 0)
+    if (frame->pass)
+        gn_pass_shade(frame, scratch, n, figures);
+    else if (!is_reference && frame->near.n > 0)
         gn_near_shade(frame, scratch, n, figures);
     int64_t t2 = gn_clock_get_monotonic_ns();
     if (!frame->run_shadow) {
@@ -119,6 +122,10 @@ static void render_centres(void *context, int item, int worker)
         const struct sample *s = &scratch->samples[i];
         int x = pixels[i][0];
         int y = pixels[i][1];
+        if (frame->pass) {
+            gn_pass_add_sample(frame->pass, x, y, s);
+            continue;
+        }
         *gn_image_at(&frame->layers->depth, x, y) = s->depth;
         gn_layers_resolve(frame, x, y, s, 1);
         keep_feature(frame, x, y, s);
@@ -189,5 +196,6 @@ void gn_tiles_render(struct frame *frame, struct gn_pool *pool)
 {
     int n_tiles = frame->tiles_x * frame->tiles_y;
     gn_pool_run(pool, n_tiles, render_centres, frame);
-    gn_pool_run(pool, n_tiles, render_edges, frame);
+    if (!frame->pass)
+        gn_pool_run(pool, n_tiles, render_edges, frame);
 }
