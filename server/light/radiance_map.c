@@ -278,6 +278,7 @@ int gn_radiance_map_copy(const struct gn_radiance_map *map, struct gn_radiance_m
     copy->capture_time_ns = map->capture_time_ns;
     copy->sequence = map->sequence;
     copy->figures = map->figures;
+    memcpy(copy->rows, map->rows, (size_t)map->radiance.height * sizeof(*map->rows));
     memcpy(copy->radiance.data, map->radiance.data,
            3 * (size_t)map->radiance.width * (size_t)map->radiance.height * sizeof(float));
     *out_map = copy;

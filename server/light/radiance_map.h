@@ -74,7 +74,7 @@ struct gn_radiance_map {
     struct gn_map_table *table;       // shared (ref) by the maps of one stream
     struct gn_map_geometry *geometry; // shared (ref) too; NULL: local model, all light is distant
     struct gn_code_table *codes;      // shared (ref) too; NULL: float frame
-    struct gn_map_row *rows;          // [height], owned: of its making; unset in copies
+    struct gn_map_row *rows;          // [height], owned: sums of its making; in a copy those of what was copied
     struct gn_projection projection;
     struct gn_image radiance;     // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
     const float *solid_angle;     // [height][width] sr, 0 outside the valid circle; the table's
@@ -110,7 +110,8 @@ GN_MUST_USE int gn_radiance_map_create(const struct gn_environment_frame *frame,
                                        const struct gn_radiance_map_options *options,
                                        struct gn_pool *pool, struct gn_radiance_map **out_map,
                                        struct gn_error *out_error);
-/** A map with pixels of its own, which the caller may change; shares the rest. 0 or -ENOMEM. */
+/** A map with pixels of its own, which the caller may change; its rows' sums stay those of the
+ * pixels copied. Shares the rest. 0 or -ENOMEM. */
 GN_MUST_USE int gn_radiance_map_copy(const struct gn_radiance_map *map,
                                      struct gn_radiance_map **out_map);
 struct gn_radiance_map *gn_radiance_map_ref(struct gn_radiance_map *map);

@@ -17,8 +17,7 @@ enum { CHUNK = 64, MAX_CHUNKS = 2 * ESTIMATE_PIXELS / CHUNK };
 #define AFFECTED 0.995
 
 struct sums {
-    double square, square2; // sum over pixels of the mean over channels, and of its square
-    int n;                  // affected pixels
+    struct gn_error_sums error;
     uint64_t rays;
 };
 
@@ -26,6 +25,8 @@ struct job {
     const struct frame *frame;
     const struct estimate *estimate;
     int step, columns, n_cells; // a pixel from each square of step x step
+    int part, n_parts;          // of the cells; each has sets of its own
+    int n_sets;                 // that pixels take theirs from
     bool has_blockers;
     struct sums sums[MAX_CHUNKS];
 };
@@ -187,8 +188,8 @@ static bool is_drawable(const struct gn_radiance_map *map)
 }
 
 /** Fills the probe's sets. *out_power: the map's luminance. */
-static void draw_sets(struct estimate *estimate, int probe, const struct gn_radiance_map *map,
-                      double *out_power)
+static void draw_sets(struct estimate *estimate, const struct job *job, int probe,
+                      const struct gn_radiance_map *map, double *out_power)
 {
     double sphere, fill = get_fill_power(map, &sphere), *rows = estimate->rows;
     rows[0] = 0;
@@ -199,10 +200,11 @@ static void draw_sets(struct estimate *estimate, int probe, const struct gn_radi
     if (!(*out_power > 0))
         return;
     double share = shown / (shown + sphere);
-    for (int i = 0; i < ESTIMATE_SETS * ESTIMATE_SET; i++) {
-        int set = i / ESTIMATE_SET;
+    for (int i = 0; i < job->n_sets * ESTIMATE_SET; i++) {
+        int set = i / ESTIMATE_SET,
+            drawn = (job->part * GN_PROBES_MAX + probe) * ESTIMATE_SETS + set;
         double at[2];
-        get_point((uint32_t)(i % ESTIMATE_SET), mix((uint64_t)(probe * ESTIMATE_SETS + set)), at);
+        get_point((uint32_t)(i % ESTIMATE_SET), mix((uint64_t)drawn), at);
         int place = get_place(at);
         if (at[0] < share)
             draw_texel(map, rows, at[0] / share * shown, at[1], share, &estimate->sets[probe][set],
@@ -234,7 +236,7 @@ static float get_cone(const struct frame *frame, const float org[static 3], floa
 static void init_view(const struct sample *s, const struct estimate_set *set, float weight,
                       const float axis[static 3], float cosine, struct view *view)
 {
-    const float *n = s->surface.normal_shading, *g = s->surface.normal_geometric;
+    const float *n = s->surface.normal_shading, *g = s->surface.normal_horizon;
     view->set = set;
     view->n_cut = 0;
     for (int i = 0; i < ESTIMATE_SET; i++) {
@@ -321,8 +323,9 @@ static void ask_pixel(const struct job *job, struct scratch *scratch, const stru
                       const float factor[static 3], uint64_t random, struct sums *sums)
 {
     double ratios[2][3], square = 0;
-    int first = (int)(random % ESTIMATE_SETS);
-    int other = (first + 1 + (int)((random >> 32) % (ESTIMATE_SETS - 1))) % ESTIMATE_SETS;
+    uint64_t n_sets = (uint64_t)job->n_sets;
+    int first = (int)(random % n_sets);
+    int other = (int)(((uint64_t)first + 1 + (random >> 32) % (n_sets - 1)) % n_sets);
     bool is_affected = false;
     get_ratio(job, scratch, s, first, ratios[0], &sums->rays);
     get_ratio(job, scratch, s, other, ratios[1], &sums->rays);
@@ -333,9 +336,9 @@ static void ask_pixel(const struct job *job, struct scratch *scratch, const stru
     }
     if (!is_affected)
         return;
-    sums->n++;
-    sums->square += square;
-    sums->square2 += square * square;
+    sums->error.n++;
+    sums->error.square += square;
+    sums->error.square2 += square * square;
 }
 
 static void ask_chunk(void *context, int item, int worker)
@@ -351,7 +354,7 @@ static void ask_chunk(void *context, int item, int worker)
         uint64_t random = mix((uint64_t)cell);
         int x = cell % job->columns * job->step + (int)(random % (uint64_t)job->step);
         int y = cell / job->columns * job->step + (int)((random >> 32) % (uint64_t)job->step);
-        if (x >= width || y >= height)
+        if (x >= width || y >= height || (int)(mix(random) % (uint64_t)job->n_parts) != job->part)
             continue;
         pixels[n] = (size_t)y * (size_t)width + (size_t)x;
         gn_primary_aim(frame, frame->rays + 3 * pixels[n], &scratch->samples[n]);
@@ -380,14 +383,13 @@ static void cut_picture(struct job *job)
     } while (job->n_cells > MAX_CHUNKS * CHUNK && job->step++);
 }
 
-static double sum_up(const struct job *job, int n_chunks, uint64_t *rays)
+double gn_error_sums_get(const struct gn_error_sums *sums, int n_sums)
 {
-    struct sums all = {0};
-    for (int i = 0; i < n_chunks; i++) {
-        all.square += job->sums[i].square;
-        all.square2 += job->sums[i].square2;
-        all.n += job->sums[i].n;
-        *rays += job->sums[i].rays;
+    struct gn_error_sums all = {0};
+    for (int i = 0; i < n_sums; i++) {
+        all.square += sums[i].square;
+        all.square2 += sums[i].square2;
+        all.n += sums[i].n;
     }
     if (all.n < ESTIMATE_LEAST)
         return -1;
@@ -396,11 +398,28 @@ static double sum_up(const struct job *job, int n_chunks, uint64_t *rays)
     return sqrt(fmax(mean, sqrt(variance)));
 }
 
+static void sum_up(const struct job *job, int n_chunks, struct gn_render_report *report)
+{
+    for (int i = 0; i < n_chunks; i++) {
+        report->error.square += job->sums[i].error.square;
+        report->error.square2 += job->sums[i].error.square2;
+        report->error.n += job->sums[i].error.n;
+        report->rays_estimate += job->sums[i].rays;
+    }
+    report->estimated_error = gn_error_sums_get(&report->error, 1);
+}
+
 int gn_estimate_make(struct estimate *estimate, const struct frame *frame, struct gn_pool *pool,
                      struct gn_render_report *report)
 {
     int64_t start_ns = gn_clock_get_monotonic_ns();
     double power = 0;
+    struct job job = {.frame = frame, .estimate = estimate, .n_parts = 1, .n_sets = ESTIMATE_SETS};
+    if (frame->options.estimate_parts > 1) {
+        job.n_parts = frame->options.estimate_parts;
+        job.part = frame->options.estimate_part;
+        job.n_sets = 2;
+    }
     report->estimated_error = -1;
     // Without a map of the light there is no truth to ask; near light is not in it.
     if (frame->options.quality == GN_QUALITY_REFERENCE || !frame->options.estimate_error ||
@@ -414,18 +433,17 @@ int gn_estimate_make(struct estimate *estimate, const struct frame *frame, struc
         if (reserve_rows(estimate, map->radiance.height) < 0)
             return -ENOMEM;
         memset(estimate->sets[p], 0, sizeof(estimate->sets[p]));
-        draw_sets(estimate, p, map, &one);
+        draw_sets(estimate, &job, p, map, &one);
         power += one;
     }
     if (!(power > 0))
         return 0;
-    struct job job = {.frame = frame, .estimate = estimate};
     // Flat real geometry hides no light from itself.
     job.has_blockers = frame->run_blockers || frame->options.shadow_ignore_real;
     cut_picture(&job);
     int n_chunks = (job.n_cells + CHUNK - 1) / CHUNK;
     gn_pool_run(pool, n_chunks, ask_chunk, &job);
-    report->estimated_error = sum_up(&job, n_chunks, &report->rays_estimate);
+    sum_up(&job, n_chunks, report);
     report->ms_estimate = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
     return 0;
 }

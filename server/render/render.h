@@ -41,6 +41,8 @@ struct gn_render_options {
     bool all_passes;         // switch every omission of the plan off (for tests)
     bool single_ray;         // no pixel gets a grid (to compare light alone)
     bool estimate_error;     // the report's estimated_error: takes about 150 000 more rays
+    int estimate_parts;      // [1, GN_ERROR_PARTS]; only one pixel in so many is asked for it, with
+    int estimate_part;       // another part of them for each of [0, estimate_parts); default: all
     bool supersample_all;    // every pixel gets its quality's grid (to test the choice of them)
     int n_lights; // most lights of the lighting state, [1, GN_LIGHTS_MAX]; those that are more are
                   // merged (light_merge.h); default: all. Not of the reference
@@ -84,6 +86,18 @@ void gn_layers_finish(struct gn_layers *layers);
 /** Most passes a plan lists. */
 #define GN_PLAN_MAX 16
 
+/** Most parts of the pixels that are asked for the error. */
+#define GN_ERROR_PARTS 16
+
+/** What asked pixels say of the error of the shadow's factor. */
+struct gn_error_sums {
+    double square, square2; // sum over pixels of the mean over channels, and of its square
+    int n;                  // affected pixels
+};
+/** The RMS error; < 0: of too few pixels. Where the mean is less than its own standard error, that
+ * error takes its place. */
+double gn_error_sums_get(const struct gn_error_sums *sums, int n_sums);
+
 /** One line of the plan. Strings are static. */
 struct gn_plan_entry {
     const char *pass; // "primary", "shade", "mirror", "shadow", "added", ...
@@ -109,6 +123,7 @@ struct gn_render_report {
      * how near it is.
      */
     double estimated_error;
+    struct gn_error_sums error; // that it is made of; of several parts those are put together
     int64_t n_virtual_pixels, n_shadow_pixels; // pixels with coverage > 0, with a factor < 1
     int64_t n_refined_pixels;                  // pixels that got more than their centre's ray
 };

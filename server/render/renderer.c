@@ -247,6 +247,12 @@ static int check_request(const struct gn_scene *scene, const struct gn_camera *c
     if (options->n_lights < 0 || options->n_lights > GN_LIGHTS_MAX)
         return gn_error_set(out_error, -EINVAL, "render: %d lights, must be 1 to %d",
                             options->n_lights, GN_LIGHTS_MAX);
+    if (options->estimate_parts < 0 || options->estimate_parts > GN_ERROR_PARTS ||
+        options->estimate_part < 0 ||
+        options->estimate_part >= (options->estimate_parts > 0 ? options->estimate_parts : 1))
+        return gn_error_set(out_error, -EINVAL,
+                            "render: part %d of %d of the error's pixels, must be under 1 to %d",
+                            options->estimate_part, options->estimate_parts, GN_ERROR_PARTS);
     if (options->grid < 0 || options->grid > MAX_GRID)
         return gn_error_set(out_error, -EINVAL, "render: a grid of %d rays, must be 1 to %d",
                             options->grid, MAX_GRID);
