@@ -53,6 +53,14 @@ static const struct gn_option option_table[] = {
      .max = 100,
      .default_value = "90",
      .help = "For --result jpeg."},
+    {.key = "budget-ms",
+     .flag = "budget-ms",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0,
+     .max = GN_LIMIT_BUDGET_MS,
+     .default_value = "0",
+     .help = "Time for each frame in the server, for which it chooses lights, rays and shadow; 0: "
+             "the room's own budget, if any. For --quality interactive."},
     {.key = "quality",
      .flag = "quality",
      .type = GN_OPTION_ENUM,
@@ -313,6 +321,7 @@ static void set_frame_options(struct view *v, const struct gn_options *options)
     v->frame.result_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8;
     v->frame.jpeg_quality =
         is_jpeg ? (uint32_t)gn_options_get_int(options, NULL, NULL, "jpeg-quality") : 0;
+    v->frame.budget_ms = (float)gn_options_get_double(options, NULL, NULL, "budget-ms");
     static const enum gn_msg_quality qualities[] = {GN_MSG_QUALITY_INTERACTIVE, GN_MSG_QUALITY_SEED,
                                                     GN_MSG_QUALITY_REFERENCE};
     v->frame.quality = qualities[gn_options_get_enum(options, NULL, NULL, "quality")];

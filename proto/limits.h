@@ -38,6 +38,8 @@
 #define GN_LIMIT_TABLE_ENTRIES 4096
 /** Milliseconds: longest time a frame may ask to be held for light. */
 #define GN_LIMIT_LIGHTING_WAIT_MS 60000
+/** Longest budget of a frame, ms. */
+#define GN_LIMIT_BUDGET_MS 60000
 /** Metres: largest coordinate of a position. */
 #define GN_LIMIT_POSITION_M 1e6
 /** JPEG quality of results where the frame names none. */

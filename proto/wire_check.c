@@ -255,6 +255,9 @@ static int check_frame(const struct gn_msg_frame *m, uint32_t payload_bytes,
     if (m->lighting_wait_ms > GN_LIMIT_LIGHTING_WAIT_MS)
         return gn_wire_refuse(fault, "FRAME.lighting_wait_ms: %u ms, must be in [0, %d]",
                               m->lighting_wait_ms, GN_LIMIT_LIGHTING_WAIT_MS);
+    if (!(m->budget_ms >= 0 && m->budget_ms <= GN_LIMIT_BUDGET_MS))
+        return gn_wire_refuse(fault, "FRAME.budget_ms: %g ms, must be in [0, %d]",
+                              (double)m->budget_ms, GN_LIMIT_BUDGET_MS);
     uint32_t ranges[GN_LIMIT_VIEWS][2];
     for (size_t i = 0; i < m->views_count; i++) {
         const struct gn_msg_frame_view *v = &m->views[i];
@@ -282,6 +285,9 @@ static int check_receipt(const struct gn_msg_receipt *r, struct gn_wire_fault *f
     for (size_t i = 0; i < GN_ARRAY_LEN(ms); i++)
         if (ms[i] < 0)
             return gn_wire_refuse(fault, "RESULT.receipt: a stage time of %g ms", (double)ms[i]);
+    if (r->has_budget && !(r->budget.budget_ms > 0 && r->budget.busy_ms >= 0))
+        return gn_wire_refuse(fault, "RESULT.receipt.budget: %g ms of %g ms",
+                              (double)r->budget.busy_ms, (double)r->budget.budget_ms);
     return 0;
 }
 

@@ -61,6 +61,7 @@ static const struct field frame_view[] = {GN_MSG_FRAME_VIEW_FIELDLIST(FIELD, 0)}
 static const struct field frame[] = {GN_MSG_FRAME_FIELDLIST(FIELD, 0)};
 static const struct field result_view[] = {GN_MSG_RESULT_VIEW_FIELDLIST(FIELD, 0)};
 static const struct field left_out[] = {GN_MSG_LEFT_OUT_FIELDLIST(FIELD, 0)};
+static const struct field budget_use[] = {GN_MSG_BUDGET_USE_FIELDLIST(FIELD, 0)};
 static const struct field receipt[] = {GN_MSG_RECEIPT_FIELDLIST(FIELD, 0)};
 static const struct field result[] = {GN_MSG_RESULT_FIELDLIST(FIELD, 0)};
 static const struct field dropped[] = {GN_MSG_DROPPED_FIELDLIST(FIELD, 0)};
@@ -86,6 +87,7 @@ static const struct message messages[] = {
     MESSAGE(FRAME, frame),
     MESSAGE(RESULT_VIEW, result_view),
     MESSAGE(LEFT_OUT, left_out),
+    MESSAGE(BUDGET_USE, budget_use),
     MESSAGE(RECEIPT, receipt),
     MESSAGE(RESULT, result),
     MESSAGE(DROPPED, dropped),
@@ -113,6 +115,7 @@ static const struct {
     {GN_MSG_FRAME_FIELDS, GN_MSG_FRAME_QUALITY_TAG, 0, _GN_MSG_QUALITY_MAX},
     {GN_MSG_RESULT_VIEW_FIELDS, GN_MSG_RESULT_VIEW_FORMAT_TAG, 0, _GN_MSG_PICTURE_FORMAT_MAX},
     {GN_MSG_RECEIPT_FIELDS, GN_MSG_RECEIPT_QUALITY_TAG, 0, _GN_MSG_QUALITY_MAX},
+    {GN_MSG_BUDGET_USE_FIELDS, GN_MSG_BUDGET_USE_VERDICT_TAG, 0, _GN_MSG_BUDGET_VERDICT_MAX},
     {GN_MSG_DROPPED_FIELDS, GN_MSG_DROPPED_REASON_TAG, 1, _GN_MSG_DROP_REASON_MAX},
 };
 

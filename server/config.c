@@ -9,6 +9,9 @@
 #include "common/text.h"
 #include "server/light_options.h"
 
+/** Lights to choose from under a budget where nothing is said. */
+#define BUDGET_LIGHTS 256
+
 /** The path as the server opens it. */
 static int get_scene_path(const struct gn_options *o, const char *room, char out[static 4096],
                           struct gn_error *error)
@@ -59,6 +62,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
                 .shadow_ignore_real = !gn_options_get_bool(o, "room", room, "shadow-real-blockers"),
             },
         .emitters = {.n_pieces = gn_options_get_int(o, "room", room, "emitter-pieces")},
+        .budget_ms = gn_options_get_double(o, "room", room, "budget-ms"),
         .environment_noise = gn_options_get_double(o, "room", room, "environment-noise"),
         .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
         .unmatched = GN_MATCH_ALL & ~gn_options_get_set(o, "room", room, "match"),
@@ -70,6 +74,8 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
         .holdable_margin = gn_options_get_double(o, "room", room, "rate-margin"),
     };
     rc = get_light(o, room, &r.light, out_error);
+    if (r.budget_ms > 0 && gn_options_is_default(o, "room", room, "lights"))
+        r.light.n_lights = BUDGET_LIGHTS;
     if (rc == 0)
         *out_room = r;
     return rc;

@@ -20,6 +20,7 @@ struct run {
     struct gn_cli_background background;
     struct gn_layers layers;
     struct gn_render_report report;
+    struct gn_cli_budget budget;
     double ms_scene, ms_light;
 };
 
@@ -58,6 +59,15 @@ static int render(const struct gn_cli_request *request, struct run *run, struct 
     if ((ret = gn_layers_init(&run->layers, run->camera.width, run->camera.height)) < 0)
         return gn_error_set(out_error, ret, "no memory for layers of %d x %d pixels",
                             run->camera.width, run->camera.height);
+    if (request->budget_ms > 0) {
+        const struct gn_cli_scene scene = {.scene = run->scene,
+                                           .needs = &run->needs,
+                                           .renderer = run->renderer,
+                                           .camera = &run->camera,
+                                           .pool = run->pool};
+        return gn_cli_render_within(request, &scene, &run->light, &run->layers, &run->report,
+                                    &run->budget, out_error);
+    }
     return gn_renderer_render(run->renderer, &run->camera, run->light, &request->render,
                               &run->layers, &run->report, out_error);
 }
@@ -86,6 +96,7 @@ static int run_request(const struct gn_cli_request *request, struct gn_error *ou
         .layers = &run.layers,
         .background = request->background ? &run.background : NULL,
         .report = &run.report,
+        .budget = request->budget_ms > 0 ? &run.budget : NULL,
         .n_threads = gn_pool_get_size(run.pool),
         .seed = request->render.seed,
         .ms_scene = run.ms_scene,

@@ -110,6 +110,21 @@ static json_t *make_text(const char *text)
     return json_string(clean);
 }
 
+/** null where the frame had none. */
+static json_t *make_budget(const struct gn_msg_receipt *r)
+{
+    static const char *const verdicts[] = {"learns", "fits", "too small"};
+    const struct gn_msg_budget_use *b = &r->budget;
+    if (!r->has_budget)
+        return json_null();
+    return json_pack("{s:f, s:f, s:s, s:f, s:f, s:I, s:I, s:I, s:I, s:I}", "budget_ms",
+                     (double)b->budget_ms, "busy_ms", (double)b->busy_ms, "verdict",
+                     verdicts[b->verdict], "predicted_ms", (double)b->predicted_ms,
+                     "predicted_error", (double)b->predicted_error, "lights", (json_int_t)b->lights,
+                     "grid", (json_int_t)b->grid, "shadow_step", (json_int_t)b->shadow_step,
+                     "misses", (json_int_t)b->misses, "switches", (json_int_t)b->switches);
+}
+
 static json_t *make_receipt(const struct gn_msg_receipt *r)
 {
     json_t *left_out = json_array();
@@ -131,10 +146,10 @@ static json_t *make_receipt(const struct gn_msg_receipt *r)
                   (json_int_t)r->rays_shadow, "secondary", (json_int_t)r->rays_secondary);
     // A negative estimate means that there is none.
     json_t *error = r->estimated_error >= 0 ? json_real((double)r->estimated_error) : json_null();
-    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o}", "stages_ms", stages,
+    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o, s:o}", "stages_ms", stages,
                      "lighting_sequence", (json_int_t)r->lighting_sequence, "lighting_age_ms",
                      (double)r->lighting_age_ms, "lights", (int)r->lights_used, "rays", rays,
-                     "left_out", left_out, "estimated_error", error);
+                     "left_out", left_out, "estimated_error", error, "budget", make_budget(r));
 }
 
 /** Appends one frame to view.json; takes it. */

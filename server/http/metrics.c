@@ -46,6 +46,8 @@ GETTER(n_movable)
 GETTER(poses_in)
 GETTER(poses_late)
 GETTER(poses_refused)
+GETTER(budget_frames)
+GETTER(budget_misses)
 GETTER(holdable_fps_room)
 GETTER(light_published)
 GETTER(n_lights)
@@ -118,6 +120,9 @@ static const struct metric metrics[] = {
     {"gnomon_lights_fading", "gauge", "Lights published that the map has no more.", get_n_fading},
     {"gnomon_lighting_age_seconds", "gauge",
      "Now minus the capture time of the lighting state; -1: no light yet.", get_light_age_s},
+    {"gnomon_budget_frames_total", "counter", "Results of frames that had a budget.",
+     get_budget_frames},
+    {"gnomon_budget_misses_total", "counter", "Those that took longer than it.", get_budget_misses},
     {"gnomon_holdable_fps", "gauge",
      "Frames per second at 640x480 that the room can hold; 0: not measured yet.",
      get_holdable_fps_room},

@@ -9,6 +9,7 @@
 
 #include "common/clock.h"
 #include "common/text.h"
+#include "server/render/budget.h"
 #include "server/http/http_internal.h"
 
 static double get_ms_since(int64_t then_ns)
@@ -141,6 +142,26 @@ static json_t *make_light(const struct gn_room_figures *f)
         "in_time", make_in_time(f));
 }
 
+static json_t *make_number(double x)
+{
+    return x >= 0 ? json_real(x) : json_null();
+}
+
+static json_t *make_budget(const struct gn_room_figures *f)
+{
+    const struct gn_msg_budget_use *b = &f->last_receipt.budget;
+    if (!f->last_receipt.has_budget)
+        return json_null();
+    return json_pack("{s:f, s:f, s:s, s:o, s:o, s:{s:I, s:I, s:I}, s:I, s:I}", "budget_ms",
+                     b->budget_ms, "busy_ms", b->busy_ms, "verdict",
+                     gn_budget_get_verdict_name((enum gn_budget_verdict)b->verdict), "predicted_ms",
+                     make_number((double)b->predicted_ms), "predicted_error",
+                     make_number((double)b->predicted_error), "setting", "lights",
+                     (json_int_t)b->lights, "grid", (json_int_t)b->grid, "shadow_step",
+                     (json_int_t)b->shadow_step, "misses", (json_int_t)b->misses, "switches",
+                     (json_int_t)b->switches);
+}
+
 static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
 {
     const struct gn_msg_receipt *r = &f->last_receipt;
@@ -155,7 +176,7 @@ static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
     // clang-format off
     return json_pack(
         "{s:i, s:i, s:s, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f},"
-        " s:I, s:f, s:I, s:{s:I, s:I, s:I}, s:f, s:o}",
+        " s:I, s:f, s:I, s:{s:I, s:I, s:I}, s:f, s:o, s:o}",
         "width", f->last_width, "height", f->last_height,
         "quality", (unsigned)r->quality < 3 ? qualities[r->quality] : "?",
         "ms", "queue", r->queue_ms, "decode", r->decode_ms, "plan", r->plan_ms,
@@ -166,7 +187,7 @@ static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
         "lights_used", (json_int_t)r->lights_used,
         "rays", "primary", (json_int_t)r->rays_primary, "shadow", (json_int_t)r->rays_shadow,
             "secondary", (json_int_t)r->rays_secondary,
-        "estimated_error", r->estimated_error, "left_out", left_out);
+        "estimated_error", r->estimated_error, "budget", make_budget(f), "left_out", left_out);
     // clang-format on
 }
 
@@ -194,7 +215,7 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
     json_t *json = json_pack(
         "{s:s, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I, s:I, s:o, s:I, s:I, s:I,"
         " s:I, s:I, s:I, s:I, s:i, s:i, s:I, s:I, s:I, s:o,"
-        " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:o, s:o, s:o, s:o}",
+        " s:{s:f, s:f, s:f}, s:f, s:{s:f, s:f}, s:{s:f, s:I, s:I}, s:o, s:o, s:o, s:o}",
         "name", gn_room_get_options(room)->name,
         "scene", "objects", f->n_objects, "real_triangles", f->n_real_triangles,
             "virtual_triangles", f->n_virtual_triangles,
@@ -214,6 +235,8 @@ static json_t *make_room(struct gn_room *room, bool *is_short)
         "latency_ms", "p50", f->latency_p50_ms, "p90", f->latency_p90_ms, "p99", f->latency_p99_ms,
         "busy_p50_ms", f->busy_p50_ms,
         "holdable_fps_640x480", "room", f->holdable_fps_room, "viewer", f->holdable_fps_viewer,
+        "budget", "ms", gn_room_get_options(room)->budget_ms,
+            "frames", (json_int_t)f->budget_frames, "misses", (json_int_t)f->budget_misses,
         "light", make_light(f), "lit_by", make_probes(room, is_short),
         "last_receipt", make_receipt(f, is_short),
         "sessions", make_sessions(room, is_short));

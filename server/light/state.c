@@ -301,6 +301,7 @@ int gn_lighting_state_create(const struct gn_environment_frame *frame,
     if (!state)
         return rc < 0 ? rc : -ENOMEM;
     int64_t start_ns = gn_clock_get_monotonic_ns();
+    state->n_asked = options->n_lights;
     state->sequence = frame->sequence;
     state->capture_time_ns = frame->capture_time_ns;
     rc = gn_radiance_map_create(frame, &map_copy, pool, &state->map, out_error);
@@ -350,6 +351,8 @@ int gn_lighting_state_complete(const struct gn_lighting_state *state,
         rc = gn_lighting_state_add_pyramid(made, options, out_error);
     if (rc == 0 && !options->no_lights && !state->has_lights)
         rc = make_lights(made, &with_tables, pool, out_error);
+    if (!state->has_lights)
+        made->n_asked = options->n_lights;
     if (rc == 0 && state->temporal && (rc = complete_in_time(made, state, options)) < 0)
         (void)gn_error_set(out_error, rc, "light in time: no memory");
     if (rc < 0) {

@@ -111,7 +111,7 @@ struct gn_light_options {
     bool no_discs; // small suns go through the method too (it is so in `seed`)
     bool no_sh;    // leave the SH irradiance out
     struct gn_irradiance_options irradiance;
-    bool no_lights;   // leave the lights out
+    bool no_lights;    // leave the lights out
     bool want_pyramid; // make the map's pyramid, for glossy materials; default: leave it out
     double smoothing; // s, time constant by which light at rest follows the frames, [0, 10]; 0: off
     uint64_t stream;  // whose frame it is; only light of the same stream is followed
@@ -162,6 +162,7 @@ struct gn_lighting_state {
     struct gn_irradiance irradiance; // of any normal
     struct gn_irradiance frame_irradiance; // of the frame alone, where light is smoothed
     bool has_lights;
+    int n_asked; // n_lights of the options it was made with
     int n_lights;
     struct gn_light *lights; // [n_lights], owned; by falling luminance
     int n_near;

@@ -317,7 +317,9 @@ static bool decide(struct gn_budget *b, const struct rung *current, const struct
         return true;
     }
     bool is_early = b->n_frames < CLIMBING;
-    if (!(best->error <= WORTH * current->error) || (!is_early && b->rested < b->wait))
+    bool has_room = best->ms * b->factor * margin < 0.5 * frame->budget_ms;
+    if (!(best->error <= (has_room ? 1 : WORTH) * current->error) ||
+        (!is_early && b->rested < b->wait))
         return false;
     b->has_risen = true;
     return true;
@@ -386,10 +388,16 @@ static void keep_spread(struct gn_budget *b, double ratio)
         b->n_spread++;
 }
 
+static int get_lights(const struct gn_budget *b, const struct gn_budget_outcome *o)
+{
+    bool is_fewer = o->n_lights > 0 && o->n_lights < b->setting.n_lights;
+    return is_fewer ? o->n_lights : b->setting.n_lights;
+}
+
 static void learn_shape(struct gn_budget *b, const struct gn_budget_outcome *o)
 {
     const struct gn_budget_setting *s = &b->setting;
-    double samples = count_samples(b, s, b->frame.n_pixels), x = s->n_lights;
+    double samples = count_samples(b, s, b->frame.n_pixels), x = get_lights(b, o);
     double plan = get_number(o->ms_plan), primary = get_number(o->ms_primary);
     double shade = get_number(o->ms_shade), shadow = get_number(o->ms_shadow);
     double rest = get_number(o->ms - plan - primary - shade - shadow);
@@ -405,15 +413,15 @@ static void learn_shape(struct gn_budget *b, const struct gn_budget_outcome *o)
     add_point(&b->rest, KEEP_TIMES, 0, rest / (double)b->frame.n_pixels);
 }
 
-static void learn_error(struct gn_budget *b, double estimated)
+static void learn_error(struct gn_budget *b, double estimated, int n_lights)
 {
-    if (!(estimated >= 0 && estimated <= 1) || b->setting.n_lights == 0)
+    if (!(estimated >= 0 && estimated <= 1) || n_lights == 0)
         return;
     // An estimate sees no grid; what the step adds is known only beforehand.
     double step = step_errors[find_step(b->setting.shadow_step)];
     double light2 = fmax(estimated * estimated - step * step, 1e-2 * estimated * estimated);
     double light = fmax(sqrt(light2), 1e-5);
-    add_point(&b->error, KEEP_ERRORS, log(b->setting.n_lights), log(light));
+    add_point(&b->error, KEEP_ERRORS, log(n_lights), log(light));
 }
 
 /** What surprises after a change of setting says what that takes; later, what the load is. */
@@ -450,7 +458,7 @@ void gn_budget_learn(struct gn_budget *b, const struct gn_budget_outcome *o)
     }
     if (!is_first) // which takes memory and fills caches, as no other does
         learn_time(b, o, ms);
-    learn_error(b, o->estimated_error);
+    learn_error(b, o->estimated_error, get_lights(b, o));
 }
 
 const char *gn_budget_get_verdict_name(enum gn_budget_verdict verdict)

@@ -12,7 +12,8 @@
  * So that it does not swing: a setting is entered where its time fits with the margin that the last
  * frames' spread asks for, and left only where it is over that by more than a dead band, or where
  * three of the last four frames were late; one late frame is the machine's hiccup. What is better
- * is entered only for a tenth less error and after a rest, which doubles whenever that went wrong.
+ * is entered only for a tenth less error, or for any where half the budget is enough, and after a
+ * rest, which doubles whenever that went wrong.
  */
 #ifndef GN_SERVER_RENDER_BUDGET_H
 #define GN_SERVER_RENDER_BUDGET_H
@@ -59,6 +60,7 @@ struct gn_budget_outcome {
     double ms_plan, ms_primary, ms_shade, ms_shadow; // as in the reports, sums over the views
     int64_t n_refined_pixels;
     double estimated_error; // of frames of this setting; < 0: not known
+    int n_lights;           // that it had where there were fewer than chosen; 0: as chosen
 };
 
 /** Straight line through weighted points; old ones count less and less. */

@@ -16,6 +16,7 @@
 #include "common/pool.h"
 #include "proto/attr.h"
 #include "server/light/state.h"
+#include "server/render/budget.h"
 #include "server/render/render.h"
 #include "server/scene/scene.h"
 
@@ -37,6 +38,7 @@ struct gn_cli_request {
     struct gn_render_options render;
     int n_emitter_pieces; // 0: the default
     const char *emission; // NAME=FILE; may be NULL
+    double budget_ms;     // 0: none
     int n_threads;        // 0: one per processor
     unsigned match;       // of enum gn_match_part
 };
@@ -79,6 +81,35 @@ GN_MUST_USE int gn_cli_background_read(const char *path, const struct gn_camera 
 /** A zeroed one is fine. */
 void gn_cli_background_finish(struct gn_cli_background *background);
 
+/** What frames of a run share. Borrowed. */
+struct gn_cli_scene {
+    const struct gn_scene *scene;
+    const struct gn_render_needs *needs;
+    struct gn_renderer *renderer;
+    const struct gn_camera *camera;
+    struct gn_pool *pool;
+};
+
+/** How a picture was fitted into its time. */
+struct gn_cli_budget {
+    int n_frames; // that were rendered for it
+    uint64_t n_misses, n_switches;
+    int n_lights;                   // to choose from
+    struct gn_budget_choice choice; // of the last frame, the one that is written
+    double ms;                      // that it took
+};
+
+/**
+ * Renders the picture until a setting that fits request->budget_ms holds; times are of rendering
+ * alone. *light is made anew in the number of lights that is chosen. Returns 0, or a negative errno
+ * and a sentence.
+ */
+GN_MUST_USE int gn_cli_render_within(const struct gn_cli_request *request,
+                                     const struct gn_cli_scene *scene,
+                                     struct gn_lighting_state **light, struct gn_layers *layers,
+                                     struct gn_render_report *out_report,
+                                     struct gn_cli_budget *out_budget, struct gn_error *out_error);
+
 /** What is written. Borrowed. */
 struct gn_cli_result {
     const struct gn_camera *camera;
@@ -88,6 +119,7 @@ struct gn_cli_result {
     const struct gn_cli_background *background; // NULL: none
     const struct gn_render_report *report;
     const struct gn_render_needs *needs;
+    const struct gn_cli_budget *budget; // NULL: none
     int n_threads;
     uint64_t seed; // of the composite's noise
     double ms_scene, ms_light, ms_total;

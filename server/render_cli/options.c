@@ -107,16 +107,19 @@ static void read_numbers(struct gn_cli_request *request)
     request->has_projection = is_set(request, "env-projection");
     if (request->has_projection)
         request->projection = (enum gn_projection_type)get_enum(request, "env-projection");
+    if (is_set(request, "budget-ms"))
+        request->budget_ms = gn_options_get_double(request->options, NULL, NULL, "budget-ms");
     request->n_threads = get_int(request, "threads");
     request->match = gn_options_get_set(request->options, NULL, NULL, "match");
 }
 
 static int check_together(const struct gn_cli_request *request, struct gn_error *out_error)
 {
-    if (is_set(request, "budget-ms"))
-        return gn_error_set(out_error, -ENOTSUP,
-                            "--budget-ms: fitting the quality into a time is not built yet; leave "
-                            "it out and choose --quality and --lights");
+    if (request->budget_ms > 0 && request->render.quality != GN_QUALITY_INTERACTIVE)
+        return gn_error_set(out_error, -EINVAL,
+                            "--budget-ms is for --quality interactive, not for %s, which is what "
+                            "it is",
+                            gn_cli_get_quality_name(request->render.quality));
     if (request->render.quality != GN_QUALITY_REFERENCE &&
         (request->render.bounces > 0 || is_set(request, "paths")))
         return gn_error_set(out_error, -EINVAL, "--%s is for --quality reference, not for %s",

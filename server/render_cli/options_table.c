@@ -189,7 +189,9 @@ static const struct gn_option table[] = {
      .min = 0.001,
      .max = 1e9,
      .value_name = "N",
-     .help = "Not built yet, and refused: a time for quality to fit in."},
+     .help = "Time that rendering the picture may take on this machine, busy as it is: it is "
+             "rendered until a number of lights and of rays at edges that fits holds, up to 64 "
+             "times. --lights is the most there are, 256 without it. The output depends on times."},
     {.key = "threads",
      .type = GN_OPTION_INT,
      .min = 0,

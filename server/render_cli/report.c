@@ -89,13 +89,35 @@ static json_t *make_left_out(const struct gn_cli_result *result)
                      "lights", light->has_lights ? NULL : result->needs->why_no_lights);
 }
 
+static json_t *make_number(double x)
+{
+    return x >= 0 ? json_real(x) : json_null();
+}
+
+/** null where there is none. */
+static json_t *make_budget(const struct gn_cli_request *request, const struct gn_cli_budget *budget)
+{
+    if (!budget)
+        return json_null();
+    const struct gn_budget_choice *c = &budget->choice;
+    return json_pack(
+        "{s:f, s:f, s:s, s:o, s:o, s:{s:i, s:i, s:i}, s:i, s:i, s:I, s:I}", "budget_ms",
+        request->budget_ms, "ms", budget->ms, "verdict", gn_budget_get_verdict_name(c->verdict),
+        "predicted_ms", make_number(c->predicted_ms), "predicted_error",
+        make_number(c->predicted_error), "setting", "lights", c->setting.n_lights, "grid",
+        c->setting.grid, "shadow_step", c->setting.shadow_step, "lights_to_choose_from",
+        budget->n_lights, "frames", budget->n_frames, "misses", (json_int_t)budget->n_misses,
+        "switches", (json_int_t)budget->n_switches);
+}
+
 /** NULL where memory runs out. */
 static json_t *make_report(const struct gn_cli_request *request, const struct gn_cli_result *result)
 {
     const struct gn_render_report *r = result->report;
     const struct gn_scene *scene = result->scene;
     return json_pack(
-        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:I, s:I, "
+        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:o, s:I, "
+        "s:I, "
         "s:I, s:{s:i, s:i, s:i}}",
         "version", GN_VERSION, "quality", gn_cli_get_quality_name(request->render.quality),
         "bounces", request->render.bounces, "width", result->camera->width, "height",
@@ -103,11 +125,11 @@ static json_t *make_report(const struct gn_cli_request *request, const struct gn
         gn_light_method_get_name(request->light.method), "plan", make_plan(r), "timings_ms",
         make_timings(result), "rays", make_rays(r), "environment", make_map(result->light->map),
         "sh", make_sh(result->light), "light_left_out", make_left_out(result), "lights",
-        r->n_lights, "estimated_error",
-        r->estimated_error < 0.0 ? json_null() : json_real(r->estimated_error), "virtual_pixels",
-        (json_int_t)r->n_virtual_pixels, "shadow_pixels", (json_int_t)r->n_shadow_pixels,
-        "refined_pixels", (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects,
-        "real_triangles", scene->n_real_triangles, "virtual_triangles", scene->n_virtual_triangles);
+        r->n_lights, "estimated_error", make_number(r->estimated_error), "budget",
+        make_budget(request, result->budget), "virtual_pixels", (json_int_t)r->n_virtual_pixels,
+        "shadow_pixels", (json_int_t)r->n_shadow_pixels, "refined_pixels",
+        (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects, "real_triangles",
+        scene->n_real_triangles, "virtual_triangles", scene->n_virtual_triangles);
 }
 
 int gn_cli_write_report(const struct gn_cli_request *request, const struct gn_cli_result *result,

@@ -59,6 +59,7 @@ struct gn_room_figures {
     uint64_t light_without_sh, light_without_lights; // states made without what nobody needed
     struct gn_temporal_figures light_in_time;        // of the last state
     uint64_t light_births, light_deaths, light_snaps, light_holds;
+    uint64_t budget_frames, budget_misses; // with a budget; that took longer
     bool has_receipt;
     int last_width, last_height;        // px, first view of the last result
     struct gn_msg_receipt last_receipt; // what was left out of it, and why, among others

@@ -11,10 +11,8 @@
 #include "common/composite.h"
 #include "common/jpeg.h"
 #include "server/room/buf_pool.h"
+#include "server/room/pace.h"
 #include "server/scene/motion.h"
-
-/** One frame in so many says its error: that takes time. */
-enum { ESTIMATE_EVERY = 16 };
 
 /** The buffers of one picture size. */
 struct frame_buffers {
@@ -33,6 +31,7 @@ struct gn_frame_maker {
     struct gn_scene_snapshot *snapshot; // a reference: what the renderer shows; NULL: the scene
     struct gn_jpeg *jpeg;
     struct gn_buf_pool *payloads;
+    struct gn_paces paces;
     uint64_t n_frames;
     struct frame_buffers buffers[GN_FRAME_KEPT_SIZES];
 };
@@ -186,8 +185,6 @@ static void add_report(struct gn_msg_receipt *receipt, const struct gn_render_re
     receipt->rays_shadow += report->rays_shadow + report->rays_shade;
     receipt->rays_secondary += report->rays_mirror;
     receipt->lights_used = (uint32_t)report->n_lights;
-    if ((float)report->estimated_error > receipt->estimated_error)
-        receipt->estimated_error = (float)report->estimated_error;
     for (int i = 0; i < report->n_plan; i++) {
         const struct gn_plan_entry *entry = &report->plan[i];
         bool is_known = entry->ran;
@@ -211,6 +208,7 @@ struct work {
     struct gn_msg_result *result;      // being filled, in the job's answer's place
     struct gn_buf *payload;            // being filled
     size_t used;                       // bytes of it
+    struct gn_pace_turn turn;          // of the viewer
     const struct gn_image8 *composite; // of the view made last
 };
 
@@ -222,13 +220,14 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     struct gn_render_options options = m->options->render;
     options.quality = (enum gn_quality)w->job->frame.quality;
     options.seed = w->job->frame.id;
-    options.estimate_error = m->n_frames % ESTIMATE_EVERY == 1; // the first frame is 1
+    gn_pace_set_options(&w->turn, &options);
     struct gn_render_report report = {0};
     int rc =
         gn_renderer_render(m->renderer, camera, w->light, &options, &b->layers, &report, error);
     if (rc < 0)
         return rc;
     add_report(&w->result->receipt, &report);
+    gn_pace_put_report(&w->turn, (int)index, &report);
     const struct gn_composite_layers layers = {&b->layers.virtual_rgba, &b->layers.shadow,
                                                &b->layers.added};
     const struct gn_composite_options look = {
@@ -346,6 +345,8 @@ void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
     }
     memset(&answer->body, 0, sizeof(answer->body));
     start_receipt(&w.result->receipt, job, light, start_ns);
+    gn_pace_begin(&maker->paces, maker->options, job, light, &w.turn);
+    out_outcome->wanted_lights = gn_paces_get_wanted(&maker->paces);
     out_outcome->reason = make_views(&w, &out_outcome->error);
     if (out_outcome->reason != 0) {
         gn_buf_unref(&w.payload);
@@ -362,6 +363,7 @@ void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
     for (size_t i = 0; i < job->frame.views_count; i++)
         pixels += (double)job->cameras[i].width * job->cameras[i].height;
     out_outcome->busy_ms = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
+    gn_pace_end(&w.turn, job, out_outcome->busy_ms, &w.result->receipt);
     out_outcome->vga_ms = out_outcome->busy_ms * (640.0 * 480.0 / pixels);
     out_outcome->composite = w.composite;
 }

@@ -24,6 +24,7 @@ struct gn_frame_outcome {
     enum gn_msg_drop_reason reason; // UNSPECIFIED: a result
     double busy_ms;
     double vga_ms;                     // busy_ms scaled by pixels to 640 x 480
+    int wanted_lights;                 // that the viewers' budgets leave room for; 0: all
     const struct gn_image8 *composite; // of the last view; the maker's until the next frame
     struct gn_error error;             // where there is a reason
 };

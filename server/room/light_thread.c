@@ -17,6 +17,7 @@ GN_LOG_TOPIC("room");
 /** What of a lighting state somebody in the room can use now. */
 struct wants {
     bool sh, lights, pyramid;
+    int n_lights; // 0: as the options say
 };
 
 /** What there is to do. */
@@ -49,7 +50,8 @@ static struct wants get_wants_locked(const struct gn_room *room) GN_REQUIRES(roo
 {
     bool is_looked_at = room->light_asked_ns > 0 &&
                         gn_clock_get_monotonic_ns() - room->light_asked_ns < GN_ROOM_LOOK_NS;
-    return (struct wants){.pyramid = !room->needs.why_no_pyramid,
+    return (struct wants){.n_lights = room->wanted_lights,
+                          .pyramid = !room->needs.why_no_pyramid,
                           .sh = !room->needs.why_no_sh || room->n_subscribers > 0,
                           .lights = !room->needs.why_no_lights || room->n_subscribers > 0 ||
                                     is_looked_at};
@@ -200,6 +202,8 @@ static struct gn_light_options get_light_options(const struct gn_room *room, str
     options.no_sh = !wants.sh;
     options.want_pyramid = wants.pyramid;
     options.no_lights = !wants.lights;
+    if (wants.n_lights > 0)
+        options.n_lights = wants.n_lights;
     return options;
 }
 
@@ -269,6 +273,7 @@ static void make_light(struct gn_room *room, struct gn_environment_decoder *deco
     options.previous = previous;
     options.stream = job->session_id;
     bool is_same = work->worked && previous && previous->stream == job->session_id &&
+                   previous->n_asked == options.n_lights &&
                    gn_worked_frame_is_same(work->worked, job, room->options.environment_noise);
     if (is_same) {
         rc = gn_lighting_state_advance(previous, job->frame.sequence, job->frame.capture_time_ns,

@@ -121,6 +121,11 @@ static void count_result(struct gn_room *room, const struct turn *turn,
         gn_time_histogram_add(&f->latency, latency_ms);
         gn_time_window_add(&room->latency_ms, latency_ms);
     }
+    if (result->receipt.has_budget) {
+        f->budget_frames++;
+        f->budget_misses += result->receipt.budget.busy_ms > result->receipt.budget.budget_ms;
+    }
+    room->wanted_lights = outcome->wanted_lights;
     f->has_receipt = true;
     f->last_receipt = result->receipt;
     f->last_width = (int)result->views[0].width;

@@ -33,6 +33,7 @@ struct gn_room_options {
     double environment_noise; // share by which radiance may differ in a frame that counts as the
                               // same, [0, 0.1]; 0: frames that are the same to the byte
     struct gn_render_options render; // quality and seed are each frame's own
+    double budget_ms;                // of each frame, [0, 60000]; 0: none, or the frame's own
     bool encoded_multiply;           // the paper's composite: the factor scales codes
     unsigned unmatched;              // of enum gn_match_part: what of the cameras is not matched
     bool refuse_reference;           // frames of reference quality are dropped

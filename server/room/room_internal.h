@@ -74,6 +74,7 @@ struct gn_room {
                                      // or the scene's own light is not shown yet
     bool has_failed_to_complete;     // a light that lacks what somebody could use stays as it is
     struct gn_lighting_state *light; // a reference, of all probes; NULL: none yet
+    int wanted_lights;               // that light is made in; 0: as the options say
     int n_reached;                   // probes whose light is in `light`
     struct gn_reached reached[GN_PROBES_MAX];
     int64_t light_asked_ns, composite_asked_ns; // when the page last looked; 0: never

@@ -17,7 +17,7 @@ OPTIONS = [
     ([GNOMON, 'track'], CONNECT | {'object', 'poses', 'orbit', 'rate', 'count'}),
     ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
     ([GNOMON, 'view'], CONNECT | REPLAY | {'camera', 'out', 'result', 'jpeg-quality', 'quality',
-                                           'outstanding', 'match', 'sync-light'}),
+                                           'budget-ms', 'outstanding', 'match', 'sync-light'}),
     ([GNOMON, 'doctor'], CONNECT),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
     ([RENDER], {'scene', 'env', 'env-projection', 'env-params', 'world-from-env', 'camera',

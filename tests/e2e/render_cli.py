@@ -164,6 +164,22 @@ def test_report():
     check(report['scene'] == {'objects': 2, 'real_triangles': 2, 'virtual_triangles': 12}, 'scene')
 
 
+def test_budget():
+    """What no machine can do, and what each can: no time is looked at."""
+    for budget, setting, verdict in (('0.001', (4, 1), 'too small'), ('1e8', (32, 3), 'fits')):
+        check_run('--report', 'report.json', '--lights', '32', '--budget-ms', budget)
+        with open('report.json') as file:
+            told = json.load(file)['budget']
+        got = told['setting']['lights'], told['setting']['grid']
+        check(got == setting and told['verdict'] == verdict, told)
+        check(told['budget_ms'] == float(budget) and told['ms'] > 0 and told['predicted_ms'] > 0, told)
+        check(told['misses'] == (told['frames'] if verdict == 'too small' else 0), told)
+        check(told['lights_to_choose_from'] == 32 and told['predicted_error'] >= 0, told)
+    check_run('--report', 'report.json')
+    with open('report.json') as file:
+        check(json.load(file)['budget'] is None, 'a budget that nobody asked for')
+
+
 def test_threads_give_the_same_bits():
     check_run('--threads', '1', out='one.exr')
     check_run('--threads', '3', out='three.exr')
@@ -320,8 +336,8 @@ def list_bad():
         yield '--%s %s: ' % (key, name), ['--report', 'report.json'], dict({key.replace('-', '_'): name}, **more)
     yield 'two outputs', ['--report', 'out.exr'], {}
     yield 'an input and an output', ['--report', 'camera.json'], {}
-    yield '--budget-ms', ['--budget-ms', '20'], {}
-    yield 'not built yet', ['--budget-ms', '20'], {}
+    yield '--budget-ms', ['--budget-ms', '0'], {}
+    yield 'is for --quality interactive', ['--budget-ms', '20', '--quality', 'seed'], {}
     yield '--no-such', ['--no-such', '3'], {}
     yield 'quality', ['--quality', 'best'], {}
     yield 'lights', ['--lights', '0'], {}

@@ -47,6 +47,41 @@ def test_lamp_in_the_scene():
         viewer.expect_dropped(viewer.send_frame(), pb.DROP_REASON_NO_LIGHTING)
 
 
+def test_budget():
+    """What no machine can do, and what each can: no time is looked at."""
+    def watch(viewer, n, **fields):
+        results = [viewer.expect_result(viewer.send_frame(lighting_wait_ms=60000, **fields))[0]
+                   for _ in range(n)]
+        return [r.receipt for r in results]
+
+    with Daemon('budget-ms = 0.001') as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
+        light_up(light)
+        receipts = watch(viewer, 20, budget_ms=50)  # the shorter one counts
+        assert all(abs(r.budget.budget_ms - 0.001) < 1e-9 for r in receipts), receipts[0].budget
+        assert receipts[0].budget.verdict == pb.BUDGET_VERDICT_LEARNS
+        assert receipts[0].budget.predicted_ms < 0
+        last = receipts[-1].budget
+        assert last.verdict == pb.BUDGET_VERDICT_TOO_SMALL and last.predicted_ms > 0.001, last
+        assert (last.lights, last.grid) == (4, 1) and last.misses == 20, last
+        assert last.busy_ms > 0.001
+        assert not watch(viewer, 1, quality=pb.QUALITY_SEED)[0].HasField('budget')
+        room = json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]
+        assert room['budget']['frames'] == room['budget']['misses'] == 20, room['budget']
+        assert room['last_receipt']['budget'] is None
+        assert b'gnomon_budget_misses_total{room="demo"} 20' in daemon.get('/metrics')[1]
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 64, 48) as viewer:
+        light_up(light)
+        assert not watch(viewer, 1)[0].HasField('budget')
+        receipts = watch(viewer, 40, budget_ms=60000)
+        last = receipts[-1].budget
+        assert last.verdict == pb.BUDGET_VERDICT_FITS and last.misses == 0, last
+        assert (last.lights, last.grid, last.shadow_step) == (64, 3, 1), last
+        assert last.busy_ms < last.budget_ms and last.switches > 0
+        assert receipts[-1].estimated_error > 0 and last.predicted_error > 0, receipts[-1]
+        status = json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['last_receipt']['budget']
+        assert status['verdict'] == 'fits' and status['setting']['lights'] == 64, status
+
+
 def test_each_id_once():
     """Frames faster than they can be rendered, from three viewers: every id comes back once."""
     with Daemon() as daemon, probe(daemon) as light:
@@ -336,7 +371,7 @@ def test_shutdown():
         assert time.monotonic() - start < 15
 
 
-run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_each_id_once,
+run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_budget, test_each_id_once,
            test_one_outstanding_loses_nothing,
            test_slow_reader, test_told_at_once, test_discs_are_told, test_waiting_for_light, test_reasons,
            test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,

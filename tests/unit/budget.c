@@ -49,6 +49,7 @@ static void get_outcome(const struct world *w, const struct gn_budget_setting *s
     o->ms_shadow = samples * step * (2e-6 + 0.3e-6 * pow(s->n_lights, 0.95));
     o->n_refined_pixels = s->grid > 1 ? (int64_t)(share * (double)w->n_pixels) : 0;
     o->ms = o->ms_plan + o->ms_primary + o->ms_shade + o->ms_shadow + 6e-6 * (double)w->n_pixels;
+    o->n_lights = 0;
     o->estimated_error = w->error * pow(s->n_lights, -0.8);
 }
 
@@ -257,7 +258,7 @@ static void test_numbers_that_are_none(void **state)
         struct world w = make_world(1, 33);
         for (int k = 0; k < 30; k++)
             run_frame(&w);
-        struct gn_budget_outcome o = {bad[i], bad[i], bad[i], bad[i], bad[i], -5, bad[i]};
+        struct gn_budget_outcome o = {bad[i], bad[i], bad[i], bad[i], bad[i], -5, bad[i], -7};
         const struct gn_budget_frame frame = {bad[i], -1, -1, -1};
         struct gn_budget_choice choice;
         gn_budget_learn(&w.budget, &o);

@@ -196,9 +196,9 @@ static void test_every_float_must_be_finite(void **state)
             visited += p.visited;
         }
     }
-    // WELCOME 1, ENVIRONMENT_FRAME 34, EMITTER_FRAME 5, POSE 8, CAMERA 30, FRAME 4 x 17, RESULT 10,
-    // LIGHTING 30, STATISTICS 3.
-    assert_int_equal(visited, 3 * 189);
+    // WELCOME 1, ENVIRONMENT_FRAME 34, EMITTER_FRAME 5, POSE 8, CAMERA 30, FRAME 4 x 17 + 1, RESULT
+    // 14, LIGHTING 30, STATISTICS 3.
+    assert_int_equal(visited, 3 * 194);
 }
 
 /** What one change of a sample must lead to, from the encoder and the decoder alike. */
@@ -245,6 +245,7 @@ static void test_enums_out_of_range(void **state)
     EXPECT_REFUSED(FRAME, frame, quality = 3, "FRAME.quality");
     EXPECT_REFUSED(RESULT, result, views[1].format = 3, "RESULT.views[1].format");
     EXPECT_REFUSED(RESULT, result, receipt.quality = 3, "RESULT.receipt.quality");
+    EXPECT_REFUSED(RESULT, result, receipt.budget.verdict = 3, "RESULT.receipt.budget.verdict");
     EXPECT_REFUSED(DROPPED, dropped, reason = 0, "DROPPED.reason");
     EXPECT_REFUSED(DROPPED, dropped, reason = 12, "DROPPED.reason");
 }
@@ -316,6 +317,10 @@ static void test_values_out_of_range(void **state)
     EXPECT_REFUSED(RESULT, result, views[0].width = 3, "RESULT.views[0]");
     EXPECT_REFUSED(RESULT, result, views[1].height = 0, "height");
     EXPECT_REFUSED(RESULT, result, receipt.encode_ms = -1, "stage time");
+    EXPECT_REFUSED(RESULT, result, receipt.budget.budget_ms = 0, "RESULT.receipt.budget");
+    EXPECT_REFUSED(RESULT, result, receipt.budget.busy_ms = -1, "RESULT.receipt.budget");
+    EXPECT_REFUSED(FRAME, frame, budget_ms = -1, "FRAME.budget_ms");
+    EXPECT_REFUSED(FRAME, frame, budget_ms = 60001, "FRAME.budget_ms");
     EXPECT_REFUSED(DROPPED, dropped, id = 0, "DROPPED.id");
     EXPECT_REFUSED(LIGHTING_STATE, lighting_state, light_count = 16385, "light_count");
     EXPECT_REFUSED(LIGHTING_STATE, lighting_state, light_count = 1, "payload");
