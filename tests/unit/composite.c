@@ -101,6 +101,27 @@ static void test_shadow_on_srgb(void **state)
     assert_int_equal(put(f, &srgb), 0);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
         assert_int_equal(f->out.data[i], 94);
+    for (int i = 0; i < WIDTH * HEIGHT * 4; i++)
+        f->rgba.data[i] = 0.5f; // light 0.5 over half of it, a sixth as the device has it
+    assert_int_equal(put(f, &srgb), 0);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
+        assert_int_equal(f->out.data[i], 130);
+}
+
+/* The compositor keeps the last picture's curve; another one of its type is another one. */
+static void test_curves_change(void **state)
+{
+    struct fixture *f = *state;
+    static const double gammas[] = {2, 1, 2};
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        f->background.data[i] = 100;
+        f->shadow.data[i] = 0.5f;
+    }
+    for (int g = 0; g < 3; g++) {
+        const struct gn_response response = {.type = GN_RESPONSE_GAMMA, .gamma = gammas[g]};
+        assert_int_equal(put(f, &response), 0);
+        assert_int_equal(f->out.data[0], g % 2 ? 50 : 71);
+    }
 }
 
 /* An edge's pixel that white covers by half mixes light, not codes: over black it is 188; over
@@ -220,6 +241,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_untouched, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_shadow_on_srgb, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_curves_change, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_half_covered, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_formula, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_codes_of_curves, set_up, tear_down),

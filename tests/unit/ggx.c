@@ -196,6 +196,27 @@ static void test_glass_splits_all_light(void **state)
     }
 }
 
+static void test_normals_that_look_away_are_turned(void **state)
+{
+    (void)state;
+    static const double away[] = {-0.9, -0.3, 0, 1e-6};
+    for (size_t i = 0; i < LENGTH(away); i++) {
+        struct gn_surface surface = make_ggx(0.5, 1, 1);
+        struct ggx ggx;
+        float dir[3];
+        aim(away[i], &surface, dir);
+        gn_ggx_init(&surface, dir, &ggx);
+        double length = 0, seen = 0;
+        for (int k = 0; k < 3; k++) {
+            length += ggx.wo[k] * ggx.wo[k];
+            seen -= ggx.frame[2][k] * dir[k];
+        }
+        assert_float_equal(length, 1, 1e-6);
+        assert_true(seen > 0 && ggx.wo[2] > 0);
+        assert_float_equal(reflect_white(&ggx), ggx.reflected[1], 2e-3);
+    }
+}
+
 /** Lambda of Smith's function by the cosine. */
 static double get_lambda(double cosine, double alpha)
 {
@@ -263,6 +284,7 @@ int main(void)
         cmocka_unit_test(test_densities_add_up),
         cmocka_unit_test(test_fresnel_has_the_published_values),
         cmocka_unit_test(test_glass_splits_all_light),
+        cmocka_unit_test(test_normals_that_look_away_are_turned),
         cmocka_unit_test(test_rough_glass_is_the_sum_of_its_facets),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

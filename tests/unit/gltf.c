@@ -205,6 +205,42 @@ static void test_normal_maps_lean_as_painted(void **state)
     gn_mesh_finish(&mesh);
 }
 
+/** Replaces bytes of the square's file. */
+static void patch(long at, const void *bytes, size_t n)
+{
+    FILE *bin = fopen(gn_test_folder_get_path("q.bin"), "r+b");
+    assert_non_null(bin);
+    assert_int_equal(fseek(bin, at, SEEK_SET), 0);
+    assert_int_equal(fwrite(bytes, 1, n, bin), n);
+    assert_int_equal(fclose(bin), 0);
+}
+
+/** A picture laid on the wrong way round: its right is left, its up stays up. */
+static void test_normal_maps_on_a_mirrored_picture(void **state)
+{
+    (void)state;
+    static const float uvs[8] = {1, 1, 0, 1, 0, 0, 1, 0};
+    struct gn_mesh mesh = {0};
+    struct gn_error error;
+    struct gn_surface s;
+    const uint8_t right[3] = {204, 128, 230}, up[3] = {128, 204, 230};
+    write_picture("normal.png", right, up);
+    assert_int_equal(read_quad("\"materials\":[{\"normalTexture\":{\"index\":0}}],"
+                               "\"textures\":[{\"source\":0,\"sampler\":0}],"
+                               "\"samplers\":[{\"wrapS\":33071,\"wrapT\":33071}],"
+                               "\"images\":[{\"uri\":\"normal.png\"}]",
+                               &mesh, &error),
+                     0);
+    gn_mesh_finish(&mesh);
+    patch(96, uvs, sizeof(uvs));
+    assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("q.gltf"), &mesh, &error), 0);
+    look(&mesh, 0.9f, 0.5f, 1, &s);
+    assert_float_equal(s.normal_shading[0], -0.6f, 0.01);
+    look(&mesh, 0.1f, 0.5f, 1, &s);
+    assert_float_equal(s.normal_shading[1], 0.6f, 0.01);
+    gn_mesh_finish(&mesh);
+}
+
 /** What is as large as the picture sees its mean, what is between texel and picture a mixture. */
 static void test_footprints_choose_the_level(void **state)
 {
@@ -286,6 +322,13 @@ static void test_rays_pass_where_alpha_is_low(void **state)
         packet.t_far[i] = INFINITY;
         packet.valid[i] = -1;
     }
+    assert_int_equal(gn_rt_get_occluded16(scene->rt, GN_RT_ALL, &packet), 0x1ff);
+    // A material of the object's own changes what the surface is made of, not where it is.
+    object = scene->objects[0];
+    object.has_material = true;
+    memset(&scene->objects[0], 0, sizeof(scene->objects[0]));
+    gn_scene_destroy(&scene);
+    assert_int_equal(gn_scene_create(&object, 1, NULL, &scene, NULL), 0);
     assert_int_equal(gn_rt_get_occluded16(scene->rt, GN_RT_ALL, &packet), 0x1ff);
     gn_scene_destroy(&scene);
 }
@@ -427,11 +470,7 @@ static void test_texture_coordinates_are_finite(void **state)
                       &mesh, &error),
             0);
         gn_mesh_finish(&mesh);
-        FILE *bin = fopen(gn_test_folder_get_path("q.bin"), "r+b");
-        assert_non_null(bin);
-        assert_int_equal(fseek(bin, 96, SEEK_SET), 0);
-        assert_int_equal(fwrite(&bad[i], sizeof(bad[i]), 1, bin), 1);
-        assert_int_equal(fclose(bin), 0);
+        patch(96, &bad[i], sizeof(bad[i]));
         assert_int_equal(gn_mesh_read_file(gn_test_folder_get_path("q.gltf"), &mesh, &error),
                          -EINVAL);
         assert_null(mesh.positions);
@@ -492,6 +531,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_factors_times_pictures),
         cmocka_unit_test(test_normal_maps_lean_as_painted),
+        cmocka_unit_test(test_normal_maps_on_a_mirrored_picture),
         cmocka_unit_test(test_footprints_choose_the_level),
         cmocka_unit_test(test_rays_pass_where_alpha_is_low),
         cmocka_unit_test(test_numbers_beside_the_pictures),

@@ -264,6 +264,40 @@ static void test_noise(void **state)
     free(last);
 }
 
+/* Where a matrix mixes the channels, the noise that a coloured shadow leaves of the background's is
+ * what remains of each channel in itself. */
+static void test_noise_through_a_matrix(void **state)
+{
+    struct fixture *f = *state;
+    const struct gn_response response = {.to_rec709 = {1, 0.8, 0, 0.1, 1, 0.3, 0, 0, 1}};
+    static const double shadow[3] = {0.9, 0.5, 0.7}, device = 0.5;
+    const double offset = 1e-4;
+    double m[9], inverse[9];
+    assert_true(gn_response_get_matrices(&response, m, inverse));
+    for (int c = 0; c < 3; c++)
+        f->options.match.noise_offset[c] = offset;
+    for (int i = 0; i < 3 * PIXELS; i++) {
+        const double *row = m + 3 * (i % 3);
+        f->picture.data[i] = (float)(device * (row[0] + row[1] + row[2]));
+        f->shadow.data[i] = (float)shadow[i % 3];
+    }
+    put(f, &response);
+    for (int c = 0; c < 3; c++) {
+        double sum = 0, squares = 0, kept = 0;
+        for (int i = 0; i < PIXELS; i++) {
+            float rgb[3];
+            memcpy(rgb, f->out.data + 3 * i, sizeof(rgb));
+            gn_response_multiply(inverse, rgb);
+            sum += (double)rgb[c] / PIXELS;
+            squares += (double)rgb[c] * (double)rgb[c] / PIXELS;
+        }
+        for (int k = 0; k < 3; k++)
+            kept += inverse[3 * c + k] * shadow[k] * m[3 * k + c];
+        double variance = offset * (1 - kept * kept);
+        assert_true(fabs(squares - sum * sum - variance) < 0.08 * variance); // 4 deviations
+    }
+}
+
 /* The same frame has the same noise, alone or on a pool; the next one and the other view another.
  */
 static void test_noise_is_of_the_frame(void **state)
@@ -344,6 +378,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_camera_pixels_stay, set_up, tear_down),
         cmocka_unit_test(test_deviates),
         cmocka_unit_test_setup_teardown(test_noise, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_noise_through_a_matrix, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_noise_is_of_the_frame, set_up, tear_down),
         cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_keep),

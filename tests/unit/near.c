@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "server/render/ggx.h"
 #include "tests/light_fixture.h"
 #include "tests/meshes.h"
 #include "tests/stage.h"
@@ -107,6 +108,39 @@ static void test_lamp_over_a_plane(void **state)
         }
         finish(&s);
     }
+}
+
+static void test_lamp_in_a_glossy_plane(void **state)
+{
+    (void)state;
+    static const double xs[] = {0.5, 1, 3};
+    const struct gn_scene_light lamp = {{0, 0, 1.25}, {8, 16, 24}, 0, GN_RT_REAL};
+    struct lit_stage s = {0};
+    add_floor(&s, GN_RT_VIRTUAL);
+    s.stage.objects[0].material = (struct gn_material){.type = GN_MATERIAL_GGX,
+                                                       .albedo = {1, 1, 1},
+                                                       .roughness = 0.6f,
+                                                       .metallic = 1,
+                                                       .ior = 1.5f};
+    light(&s, &lamp, 1, 0);
+    for (size_t j = 0; j < sizeof(xs) / sizeof(xs[0]); j++) {
+        struct gn_surface surface = {.roughness = 0.6f,
+                                     .metallic = 1,
+                                     .albedo = {1, 1, 1},
+                                     .ior = 1.5f,
+                                     .normal_shading = {0, 0, 1}};
+        double d2 = xs[j] * xs[j] + 1.25 * 1.25, value[3], pdf;
+        const float from_eye[3] = {(float)(-3 / sqrt(25.25)), (float)(4 / sqrt(25.25)),
+                                   (float)(-0.5 / sqrt(25.25))};
+        const float to_lamp[3] = {(float)(-xs[j] / sqrt(d2)), 0, (float)(1.25 / sqrt(d2))};
+        struct ggx ggx;
+        gn_ggx_init(&surface, from_eye, &ggx);
+        gn_ggx_eval(&ggx, to_lamp, value, &pdf);
+        double expected = M_PI * value[0] * 8 / d2;
+        assert_near(get_irradiance(&s, xs[j], &interactive), expected, 1e-3 * expected);
+        assert_near(get_irradiance(&s, xs[j], &reference), expected, 1e-3 * expected);
+    }
+    finish(&s);
 }
 
 /** Form factor of a rectangle w x h at height c, its middle above the point's (x, 0): the sum over
@@ -400,6 +434,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_lamp_over_a_plane),
+        cmocka_unit_test(test_lamp_in_a_glossy_plane),
         cmocka_unit_test(test_rectangle_over_a_plane),
         cmocka_unit_test(test_disc_on_its_axis),
         cmocka_unit_test(test_shadow_of_a_disc_under_a_lamp),

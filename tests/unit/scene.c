@@ -46,14 +46,17 @@ static void test_manifest_is_read(void **state)
                    " \"material\":{\"type\":\"diffuse\",\"albedo\":[0.1,0.2,0.3]},"
                    " \"world_from_object\":[1,0,0,15, 0,1,0,0, 0,0,1,0, 0,0,0,1]},"
                    "{\"mesh\":\"a.obj\",\"role\":\"virtual\",\"material\":{\"type\":\"mirror\"},"
-                   " \"world_from_object\":[1,0,0,20, 0,1,0,0, 0,0,1,0, 0,0,0,1]}"
+                   " \"world_from_object\":[1,0,0,20, 0,1,0,0, 0,0,1,0, 0,0,0,1]},"
+                   "{\"mesh\":\"a.obj\",\"role\":\"virtual\","
+                   " \"material\":{\"type\":\"glass\",\"roughness\":0.25,\"ior\":1.75},"
+                   " \"world_from_object\":[1,0,0,25, 0,1,0,0, 0,0,1,0, 0,0,0,1]}"
                    "],\"lights\":[]}",
                    &scene, &error);
     assert_string_equal(error.text, "");
     assert_int_equal(ret, 0);
-    assert_int_equal(scene->n_objects, 5);
+    assert_int_equal(scene->n_objects, 6);
     assert_int_equal(scene->n_real_triangles, 2);
-    assert_int_equal(scene->n_virtual_triangles, 8);
+    assert_int_equal(scene->n_virtual_triangles, 10);
     assert_string_equal(scene->objects[0].name, "a.obj");
     assert_string_equal(scene->objects[1].name, "a red square");
 
@@ -71,6 +74,10 @@ static void test_manifest_is_read(void **state)
     s = look(scene, 20.1f, 0.2f, false);
     assert_int_equal(s.material, GN_MATERIAL_MIRROR);
     assert_float_equal(s.albedo[0], 1.0f, 0.0);
+    s = look(scene, 25.1f, 0.2f, false);
+    assert_int_equal(s.material, GN_MATERIAL_GLASS);
+    assert_float_equal(s.roughness, 0.25f, 0.0);
+    assert_float_equal(s.ior, 1.75f, 0.0);
     gn_scene_destroy(&scene);
     assert_null(scene);
 }
@@ -124,6 +131,22 @@ static void test_manifest_errors_say_where(void **state)
         {"{\"objects\":[" OBJECT ",\"world_from_object\":[1,0,0,9e20, 0,1,0,0, 0,0,1,0, "
          "0,0,0,1]}]}",
          {"scene.json", "at most"}},
+        {"{\"objects\":[" OBJECT
+         ",\"name\":\"a\",\"movable\":true,\"world_from_object\":[-1,0,0,0, "
+         "0,1,0,0, 0,0,1,0, 0,0,0,1]}]}",
+         {"object 0 (a)", "mirrors"}},
+        {"{\"objects\":[" OBJECT ",\"name\":\"a\",\"movable\":true,\"world_from_object\":[2,0,0,0, "
+         "0,1,0,0, 0,0,1,0, 0,0,0,1]}]}",
+         {"object 0 (a)", "stretches"}},
+        {"{\"objects\":[" OBJECT ",\"name\":\"a\",\"movable\":true}," OBJECT ",\"name\":\"a\"}]}",
+         {"objects 0 and 1", "both named \"a\""}},
+        {"{\"objects\":[" OBJECT ",\"name\":\"a\",\"movable\":true,\"material\":{\"type\":"
+         "\"diffuse\",\"emission\":[1,1,1]}}]}",
+         {"object 0 (a)", "cannot send light"}},
+        {"{\"objects\":[" OBJECT
+         ",\"movable\":true,\"name\":\"0123456789012345678901234567890123456789"
+         "012345678901234567890123\"}]}",
+         {"object 0", "1 to 63 bytes"}},
     };
     for (size_t i = 0; i < LENGTH(cases); i++)
         assert_refused(cases[i].json, cases[i].says);
