@@ -239,6 +239,28 @@ static void fill_cluster(const struct build *build, int c, struct clusters *out)
     cluster->n_vertices = out->n_vertices - cluster->first_vertex;
 }
 
+/** Lists the vertices, those at one place once; of a box, which may move, all. */
+static void list_corners(struct clusters *clusters)
+{
+    int n = 0;
+    for (int c = 0; c < clusters->n; c++) {
+        struct cluster *cluster = &clusters->cluster[c];
+        cluster->first_corner = n;
+        for (int v = cluster->first_vertex; v < cluster->first_vertex + cluster->n_vertices; v++) {
+            bool is_new = true;
+            for (int i = cluster->first_corner; i < n && is_new && cluster->has_edges; i++) {
+                int other = clusters->corners[i];
+                is_new = false;
+                for (int k = 0; k < 3; k++)
+                    is_new |= clusters->vertices[k][v] != clusters->vertices[k][other];
+            }
+            if (is_new)
+                clusters->corners[n++] = (uint16_t)v;
+        }
+        cluster->n_corners = n - cluster->first_corner;
+    }
+}
+
 static int reserve_vertices(float *vertices[static 3])
 {
     for (int k = 0; k < 3; k++) {
@@ -297,6 +319,11 @@ int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role, struct c
     ret = reserve_vertices(out->vertices);
     for (int c = 0; c < n_clusters && ret == 0; c++)
         fill_cluster(build, c, out);
+    out->corners = malloc(MAX_CLUSTERS * 3 * CLUSTER_TRIANGLES * sizeof(*out->corners));
+    if (!out->corners)
+        ret = -ENOMEM;
+    if (ret == 0)
+        list_corners(out);
     if (ret == 0)
         ret = gn_edges_make(out);
     if (ret == 0)
@@ -316,6 +343,7 @@ void gn_clusters_finish(struct clusters *clusters)
         free(clusters->vertices[k]);
         free(clusters->own_vertices[k]);
     }
+    free(clusters->corners);
     free(clusters->edges);
     gn_movers_finish(&clusters->movers);
     memset(clusters, 0, sizeof(*clusters));
@@ -369,13 +397,12 @@ void gn_clusters_pose(struct clusters *clusters, const struct gn_scene *scene)
 static bool is_under(const struct clusters *clusters, const struct cluster *cluster,
                      const float org[static 3], const float n[static 3])
 {
-    const float *x = clusters->vertices[0] + cluster->first_vertex;
-    const float *y = clusters->vertices[1] + cluster->first_vertex;
-    const float *z = clusters->vertices[2] + cluster->first_vertex;
-    for (int i = 0; i < cluster->n_vertices; i++) {
-        double height = (double)n[0] * ((double)x[i] - org[0]) +
-                        (double)n[1] * ((double)y[i] - org[1]) +
-                        (double)n[2] * ((double)z[i] - org[2]);
+    const uint16_t *corners = clusters->corners + cluster->first_corner;
+    for (int i = 0; i < cluster->n_corners; i++) {
+        int v = corners[i];
+        double height = (double)n[0] * ((double)clusters->vertices[0][v] - org[0]) +
+                        (double)n[1] * ((double)clusters->vertices[1][v] - org[1]) +
+                        (double)n[2] * ((double)clusters->vertices[2][v] - org[2]);
         if (height > -(double)cluster->slack)
             return false;
     }

@@ -348,7 +348,7 @@ static void ask_chunk(void *context, int item, int worker)
     struct scratch *scratch = &frame->scratches[worker];
     struct tile_figures figures = {0};
     struct sums sums = {0};
-    size_t pixels[CHUNK];
+    int pixels[CHUNK][2];
     int n = 0, width = frame->camera->width, height = frame->camera->height;
     for (int cell = item * CHUNK; cell < (item + 1) * CHUNK && cell < job->n_cells; cell++) {
         uint64_t random = mix((uint64_t)cell);
@@ -356,17 +356,21 @@ static void ask_chunk(void *context, int item, int worker)
         int y = cell / job->columns * job->step + (int)((random >> 32) % (uint64_t)job->step);
         if (x >= width || y >= height || (int)(mix(random) % (uint64_t)job->n_parts) != job->part)
             continue;
-        pixels[n] = (size_t)y * (size_t)width + (size_t)x;
-        gn_primary_aim(frame, frame->rays + 3 * pixels[n], &scratch->samples[n]);
+        pixels[n][0] = x;
+        pixels[n][1] = y;
+        gn_primary_aim(frame, frame->rays + 3 * ((size_t)y * (size_t)width + (size_t)x),
+                       &scratch->samples[n]);
         n++;
     }
     gn_primary_trace(frame, scratch->samples, n, &figures);
     gn_render_weigh_probes(frame, scratch->samples, n);
     sums.rays = figures.rays_primary;
     for (int i = 0; i < n; i++) {
+        const int *at = pixels[i];
+        uint64_t pixel = (uint64_t)at[1] * (uint64_t)width + (uint64_t)at[0];
         if (scratch->samples[i].is_receiver)
-            ask_pixel(job, scratch, &scratch->samples[i], frame->features[pixels[i]].color,
-                      mix(~(uint64_t)pixels[i]), &sums);
+            ask_pixel(job, scratch, &scratch->samples[i],
+                      gn_refine_get_feature(frame, at[0], at[1])->color, mix(~pixel), &sums);
     }
     job->sums[item] = sums;
 }

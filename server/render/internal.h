@@ -20,10 +20,14 @@
 #define TILE 16
 /** Most samples of a batch. */
 #define BATCH (TILE * TILE)
+/** Side of a block of pixels, px. */
+#define BLOCK 4
 /** Mirrors a ray may meet one after another; after that it takes the map's radiance. */
 #define MIRROR_DEPTH 8
 /** Receivers of a block, neighbours in the picture: as many as a packet's rays. */
 #define LANES GN_RT_PACKET
+/** Blocks of a tile's side. */
+#define BLOCKS (TILE / BLOCK)
 /** Boxes that real geometry is put in for conservative tests. */
 #define MAX_BLOCKERS 64
 /** Clusters of a set's triangles. */
@@ -39,7 +43,7 @@
 
 struct optics;
 struct pass;
-struct silhouette;
+struct silhouettes;
 
 enum sample_kind { SAMPLE_NOTHING = 0, SAMPLE_REAL = 1, SAMPLE_VIRTUAL = 2 };
 
@@ -74,6 +78,14 @@ struct sample {
     double open[3], cut[3];
     double base[3], lost[3], gain[3];
     uint32_t shown; // 1 + the virtual object that a real mirror or glass shows here; 0: none
+};
+
+/** What the rays of 16 pixels meet. */
+struct sight {
+    float dir[3][LANES]; // unit, world
+    float dir_z[LANES];  // their components along the camera's z
+    bool has_ray[LANES]; // false: outside the picture, or the camera has no ray there
+    struct gn_rt_packet_hits hits;
 };
 
 /** A box for conservative tests, m; or of directions. */
@@ -128,7 +140,8 @@ struct cluster {
     bool has_edges;               // false: of too many triangles, or of several that move
     bool is_flat;                 // of one object, which lies in one plane
     int first_edge, n_edges;
-    int mover;   // of whose triangles it is; CLUSTER_RESTS, CLUSTER_MIXED
+    int first_corner, n_corners; // in the clusters' corners: each vertex's place once
+    int mover;                   // of whose triangles it is; CLUSTER_RESTS, CLUSTER_MIXED
     float slack; // m, by which rounding may put what is traced elsewhere; 0 where all rests
 };
 
@@ -188,6 +201,7 @@ struct clusters {
     float *vertices[3];         // world, owned
     float *own_vertices[3];     // of movers': mesh coordinates, owned; NULL where nothing moves
     bool is_flat[MAX_CLUSTERS]; // of the objects' first clusters, which are also the blockers
+    uint16_t *corners;          // indices of vertices, owned
     struct edge *edges;         // owned; an edge of triangles of two clusters is in one of them
     struct movers movers;
 };
@@ -226,23 +240,40 @@ struct receivers {
     struct box box;                                   // of all
 };
 
-/** Clusters that rays down from a block may meet. */
-struct low_list {
+/** Boxes that rays from a block's lanes may meet. */
+struct box_list {
     int block; // -1: not made
     int n;
-    struct box boxes[MAX_CLUSTERS]; // widened
+    uint16_t lanes[MAX_CLUSTERS];            // from which
+    _Alignas(64) float min[3][MAX_CLUSTERS]; // widened
+    _Alignas(64) float max[3][MAX_CLUSTERS];
 };
+
+/** All light of a pair of normals. */
+struct whole {
+    float shading[3], geometric[3];
+    double irradiance[3];
+};
+
+/** Pairs of normals that are kept: a room's walls. */
+#define WHOLES 8
 
 /** What one worker needs for a batch, and its counts. */
 struct scratch {
+    struct sight sights[BLOCKS * BLOCKS];
+    struct whole wholes[WHOLES]; // of the frame's lights, the last ones that were needed
+    int n_wholes;                // so many were made
+    uint64_t wholes_of;          // the frame
     struct sample samples[BATCH];
     int lit[BATCH]; // indices of samples that shading works on
     struct receivers receivers;
-    int16_t shadow_lights[GN_LIGHTS_MAX]; // those that virtual objects may hide from a receiver
+    int16_t shadow_lights[GN_LIGHTS_MAX]; // that virtual objects may hide from a receiver, a tile
     int n_shadow_lights;
-    struct low_list low[2];                        // of the real, the virtual silhouette
+    struct box_list low[2]; // by role, real first: those that rays downwards may meet
+    struct box_list high;   // those of one role that rays upwards may meet
     uint16_t cut[BATCH / LANES][GN_LIGHTS_MAX];    // per block and light, bit i: virtual objects
     uint16_t hidden[BATCH / LANES][GN_LIGHTS_MAX]; // (real objects) hide it from lane i
+    uint16_t mask[GN_LIGHTS_MAX];
     uint16_t near_cut[BATCH / LANES][GN_NEAR_LIGHTS_MAX]; // the same of near lights
     uint16_t near_hidden[BATCH / LANES][GN_NEAR_LIGHTS_MAX];
     struct gn_rt_packet packet;
@@ -274,6 +305,7 @@ struct tile_figures {
 
 /** One frame, const while the workers run. */
 struct frame {
+    uint64_t serial; // of the renderer's frames, the first is 1
     const struct gn_scene *scene;
     const struct gn_rt *rt;
     const struct gn_kernels *kernels;
@@ -286,13 +318,14 @@ struct frame {
     const float *rays;           // [h][w][3] of pixel centres, camera frame; z 0: none
     bool has_real, has_virtual;
     struct box real_box, virtual_box; // the virtual one widened against rounding
+    struct box solid_box;             // the same of real clusters that are not flat
     const struct box *blockers;       // [n_blockers] real objects, exact
     const struct box *wide_blockers;  // the same, widened against rounding
     int n_blockers;
     const struct clusters *clusters; // [2]: real, virtual
     float margin;                    // m, by which boxes are widened
-    // By role, NULL: not made. The real ones are without what is flat.
-    const struct silhouette *real_silhouettes, *virtual_silhouettes; // [lights->n]
+    // Of all lights; NULL: not made. The real ones are without what is flat.
+    const struct silhouettes *real_silhouettes, *virtual_silhouettes;
     float pixel_angle; // rad, between neighbouring pixels' rays; for pictures on meshes
     const struct light_list *lights; // seed, interactive: the state's; reference: the map's
     struct near_lights near;         // of the state; reference: finer
@@ -301,18 +334,21 @@ struct frame {
     float floor_radiance;            // radiances below this do not make contrast
 
     // The plan: what runs.
-    bool run_shadow;   // shadow on real surfaces
-    bool run_blockers; // real geometry may hide lights from real surfaces
+    bool run_light_loop; // virtual surfaces are lit light by light
+    bool run_shadow;     // shadow on real surfaces
+    bool run_blockers;   // real geometry may hide lights from real surfaces
     bool run_bounces;
     bool run_optics;   // real mirrors and glass show virtual objects and their shadows
     bool run_caustics; // light of virtual mirrors and glass comes by photons
     bool cull;         // leave out rays that cannot meet the virtual objects
+    bool skips;        // leave out blocks of pixels that show nothing of the virtual objects
 
     uint64_t n_photons, rays_caustics; // after the pass: photons that the camera sees
 
     const struct pass *pass; // NULL: a frame by itself; else its samples go into the pass' sums
     struct gn_layers *layers;
-    struct feature *features;     // [h][w]
+    struct feature *features;     // [h][w], but of plain blocks
+    bool *plain;                  // [tiles_y * BLOCKS][tiles_x * BLOCKS] such as nothing is lost in
     struct tile_figures *figures; // [n_tiles]
     struct scratch *scratches;    // [n_workers]
     int tiles_x, tiles_y;
@@ -346,6 +382,17 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
 /** Fills table[h][w][3] and slopes; see struct frame. pass: NULL, or whose points of the pixels. */
 void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
                           struct gn_pool *pool, float *table, double out_slopes[static 4]);
+/** Aims rays through the centres of a block's pixels, the first of which is (x, y). */
+void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight *out);
+/** Fills the hits. */
+void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
+                            struct tile_figures *figures);
+/** A box about the origins of rays from all that the lanes see, widened. False: something is seen
+ * that takes more to tell. */
+bool gn_primary_bound(const struct frame *frame, const struct sight *sight, struct box *out_box);
+/** What a lane sees, as a sample; all but its group and its seed. */
+void gn_primary_take(const struct frame *frame, const struct sight *sight, int lane,
+                     struct sample *out_sample, struct tile_figures *figures);
 /** The unit world direction of a camera direction. */
 void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
                     struct sample *sample);
@@ -396,6 +443,13 @@ void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n
 /** base, lost and gain of the real samples and of those that see nothing. */
 void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n,
                        struct tile_figures *figures);
+/** Lists in scratch the lights that virtual objects may hide from somewhere in the box. */
+void gn_shadow_list_lights(const struct frame *frame, struct scratch *scratch,
+                           const struct box *box);
+/** True where surely no shadow of a virtual object by these lights, or by near ones, reaches the
+ * box. */
+bool gn_shadow_is_free(const struct frame *frame, const struct scratch *scratch,
+                       const struct box *box);
 /** Which pixels of the batch have a sample that is cut (with bounces: all): their sums are needed.
  */
 void gn_shadow_find_groups(const struct frame *frame, const struct sample *samples, int n,
@@ -425,11 +479,20 @@ void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int 
 /** After the last of those. */
 void gn_receivers_flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
                         uint16_t (*masks)[GN_LIGHTS_MAX], uint64_t *rays);
-/** Irradiance by the lights that hidden[n lights] does not mark, and the part of it that
- * cut[n lights] marks. */
-void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, int block,
-                      const uint16_t *hidden, const uint16_t *cut, bool unweighted,
-                      double out_open[static 3][LANES], double out_cut[static 3][LANES]);
+/** Irradiance by the lights that mask[n lights] marks, bit i: in lane i; NULL: by all. */
+void gn_receivers_sum(const struct frame *frame, const struct receivers *receivers, int block,
+                      const uint16_t *mask, bool unweighted, double out[static 3][LANES]);
+
+/* occlusion.c: which distant lights do objects hide from scratch's receivers */
+
+/** Clears the masks cut and hidden, and what is wanted. */
+void gn_occlusion_clear(const struct frame *frame, struct scratch *scratch);
+/** Marks in cut what virtual objects hide, of the lights that scratch lists. */
+void gn_occlusion_find_cut(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
+/** Marks in hidden what real objects hide from the wanted receivers; not where it is marked. */
+void gn_occlusion_find_hidden(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
+/** Marks in hidden what any object hides from all receivers. */
+void gn_occlusion_find_all(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
 
 /* blockers.c */
 
@@ -556,11 +619,20 @@ void gn_bounce_gather_specular(const struct frame *frame, const struct sample *s
 
 extern const struct refine_rule gn_refine_rules[3]; // by enum gn_quality
 
+/** Of the block that the pixel is in. */
+bool *gn_refine_plain_at(const struct frame *frame, int x, int y);
+/** True where the pixel's block and those about it are plain. */
+bool gn_refine_is_all_plain(const struct frame *frame, int x, int y);
+/** A pixel's centre; NULL outside the picture. */
+const struct feature *gn_refine_get_feature(const struct frame *frame, int x, int y);
 /** True where the pixel needs its quality's grid. */
 bool gn_refine_is_needed(const struct frame *frame, int x, int y);
 
 /* layers.c */
 
+/** Fills a block's pixels, the first of which is (x, y), with nothing but their depths. */
+void gn_layers_write_plain(const struct frame *frame, int x, int y,
+                           const float depths[static LANES]);
 /** Makes pixel (x, y) of its samples. */
 void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sample *samples,
                        int n);

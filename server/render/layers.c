@@ -33,6 +33,22 @@ void gn_layers_finish(struct gn_layers *layers)
     memset(layers, 0, sizeof(*layers));
 }
 
+void gn_layers_write_plain(const struct frame *frame, int x, int y,
+                           const float depths[static LANES])
+{
+    struct gn_layers *layers = frame->layers;
+    int n = layers->width - x < BLOCK ? layers->width - x : BLOCK;
+    for (int row = 0; row < BLOCK && y + row < layers->height; row++) {
+        float *shadow = gn_image_at(&layers->shadow, x, y + row);
+        memset(gn_image_at(&layers->virtual_rgba, x, y + row), 0, 4 * sizeof(float) * (size_t)n);
+        memset(gn_image_at(&layers->added, x, y + row), 0, 3 * sizeof(float) * (size_t)n);
+        memcpy(gn_image_at(&layers->depth, x, y + row), depths + (size_t)row * BLOCK,
+               sizeof(float) * (size_t)n);
+        for (int i = 0; i < 3 * n; i++)
+            shadow[i] = 1;
+    }
+}
+
 /** Most pixels by far: one sample of what is real and loses no light. */
 static bool is_plain(const struct sample *s, int n)
 {

@@ -282,11 +282,11 @@ void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile
     }
 }
 
-bool gn_near_can_cast(const struct frame *frame)
+bool gn_near_can_cast(const struct frame *frame, const struct box *box)
 {
     for (int l = 0; l < frame->near.n; l++) {
         const struct gn_near_light *light = &frame->near.lights[l];
-        struct box hull = get_hull(&frame->real_box, light->position_world);
+        struct box hull = get_hull(box, light->position_world);
         if (light->role == GN_RT_VIRTUAL || overlap(&hull, &frame->virtual_box))
             return true;
     }

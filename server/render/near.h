@@ -23,6 +23,7 @@ struct tile_figures;
 #define NEAR_SHARE 4e-7
 
 /** How one near light reaches a point. */
+struct box;
 struct near_ray {
     float dir[3];  // unit, to the light; 0: the point is where the light is
     float length;  // m, of the ray that must be free; 0: nothing is in the way
@@ -64,8 +65,8 @@ void gn_near_find_hidden(const struct frame *frame, struct scratch *scratch,
 /** Adds to the sums open and cut of the wanted receivers. */
 void gn_near_sum(const struct frame *frame, struct scratch *scratch, struct tile_figures *figures);
 
-/** Can any near light change a real surface? */
-bool gn_near_can_cast(const struct frame *frame);
+/** Can any near light change a real surface in the box? */
+bool gn_near_can_cast(const struct frame *frame, const struct box *box);
 
 /**
  * Global model: a state's light at a finite distance as a near light: a piece of a real surface

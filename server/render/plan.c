@@ -73,7 +73,7 @@ static bool can_any_light_cast(const struct frame *frame)
         if (!is_dark && gn_box_may_meet_from_box(&frame->virtual_box, &frame->real_box, dir))
             return true;
     }
-    return gn_near_can_cast(frame);
+    return gn_near_can_cast(frame, &frame->real_box);
 }
 
 static bool is_real_flat(const struct frame *frame)
@@ -188,6 +188,7 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
 
     const char *no_virtual = all ? NULL : why_not_virtual(frame, slopes);
     const char *no_loop = why_not_light_loop(frame);
+    frame->run_light_loop = !no_virtual && !no_loop;
     set_line(report, SHADE, no_virtual ? no_virtual : no_loop, "virtual objects may be in view");
     const char *no_mirror = has_virtual(frame, 1u << GN_MATERIAL_MIRROR)
                                 ? no_virtual
@@ -204,6 +205,8 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     const char *no_blockers = why_not_blockers(frame);
     frame->run_shadow = !no_shadow;
     frame->run_blockers = !no_blockers;
+    frame->skips = !all && !options->supersample_all && !frame->pass && !frame->run_bounces &&
+                   options->quality != GN_QUALITY_REFERENCE && frame->near.n_virtual == 0;
     set_line(report, SHADOW, no_shadow, "virtual objects may hide light from real ones");
     set_line(report, BLOCKERS, no_shadow ? no_shadow : no_blockers,
              "real objects may hide light from real ones");

@@ -3,6 +3,7 @@
 #include "server/render/internal.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "server/render/pass.h"
 
@@ -90,16 +91,98 @@ void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
     sample->dir_z = dir_camera[2];
 }
 
-/** What the sample sees, by its ray's hit. */
-static void take_hit(const struct frame *frame, struct sample *s, const struct gn_rt_hit *hit,
-                     struct tile_figures *figures)
+void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight *out)
+{
+    size_t width = (size_t)frame->camera->width;
+    float dir[3][LANES];
+    const float *const from_camera[3] = {dir[0], dir[1], dir[2]};
+    float *const world[3] = {out->dir[0], out->dir[1], out->dir[2]};
+    for (int i = 0; i < LANES; i++) {
+        int px = x + i % BLOCK;
+        int py = y + i / BLOCK;
+        bool is_inside = px < frame->camera->width && py < frame->camera->height;
+        const float *from = frame->rays + (is_inside ? 3 * ((size_t)py * width + (size_t)px) : 0);
+        for (int k = 0; k < 3; k++)
+            dir[k][i] = from[k];
+        out->has_ray[i] = is_inside && from[2] > 0;
+    }
+    frame->kernels->turn(frame->world_from_camera, from_camera, world);
+    memcpy(out->dir_z, dir[2], sizeof(out->dir_z));
+}
+
+void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
+                            struct tile_figures *figures)
+{
+    struct gn_rt_packet packet;
+    int n_rays = 0;
+    for (int i = 0; i < LANES; i++) {
+        packet.org_x[i] = frame->origin[0];
+        packet.org_y[i] = frame->origin[1];
+        packet.org_z[i] = frame->origin[2];
+        packet.t_near[i] = 0;
+        packet.t_far[i] = INFINITY;
+        packet.valid[i] = sight->has_ray[i] ? -1 : 0;
+        n_rays += sight->has_ray[i];
+    }
+    memcpy(packet.dir_x, sight->dir[0], sizeof(packet.dir_x));
+    memcpy(packet.dir_y, sight->dir[1], sizeof(packet.dir_y));
+    memcpy(packet.dir_z, sight->dir[2], sizeof(packet.dir_z));
+    sight->hits.met = 0;
+    figures->rays_primary += (uint64_t)n_rays;
+    // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
+    if (n_rays > 0)
+        gn_rt_intersect16(frame->rt, GN_RT_ALL, &packet, &sight->hits);
+}
+
+/** Is what a ray sees of the object told by the hit alone? */
+static bool is_simple(const struct frame *frame, const struct gn_scene_object *object)
+{
+    if (object->role != GN_RT_REAL || object->is_movable || object->mesh.normals)
+        return false;
+    if (!frame->run_optics)
+        return true;
+    enum gn_material_type type = object->material.type;
+    return object->has_material ? type != GN_MATERIAL_MIRROR && type != GN_MATERIAL_GLASS
+                                : !object->mesh.materials;
+}
+
+/* Rays leave a resting surface that is not lifted by its clearance off the point, at most
+ * FLT_EPSILON (4 + 16 x 2) times the largest coordinate: less than half of the frame's margin. */
+bool gn_primary_bound(const struct frame *frame, const struct sight *sight, struct box *out_box)
+{
+    for (uint32_t met = sight->hits.met; met != 0; met &= met - 1) {
+        uint32_t index = sight->hits.object[__builtin_ctz(met)];
+        if (!is_simple(frame, &frame->scene->objects[index]))
+            return false;
+    }
+    gn_rt_bound_points(frame->rt, &sight->hits, out_box->min, out_box->max);
+    for (int k = 0; k < 3; k++) {
+        out_box->min[k] -= frame->margin;
+        out_box->max[k] += frame->margin;
+    }
+    return true;
+}
+
+void gn_primary_take(const struct frame *frame, const struct sight *sight, int lane,
+                     struct sample *s, struct tile_figures *figures)
 {
     const struct gn_surface *surface = &s->surface;
-    gn_scene_get_surface_filtered(frame->scene, s->dir, hit, hit->distance * frame->pixel_angle,
+    struct gn_rt_hit hit;
+    for (int k = 0; k < 3; k++)
+        s->dir[k] = sight->dir[k][lane];
+    s->dir_z = sight->dir_z[lane];
+    s->kind = SAMPLE_NOTHING;
+    s->depth = INFINITY;
+    s->is_receiver = s->is_cut = s->is_lit = false;
+    s->shown = 0;
+    if (!(sight->hits.met >> lane & 1))
+        return;
+    gn_rt_get_hit(frame->rt, &sight->hits, lane, &hit);
+    gn_scene_get_surface_filtered(frame->scene, s->dir, &hit, hit.distance * frame->pixel_angle,
                                   &s->surface);
     s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
-    s->object = hit->object;
-    s->depth = hit->distance * s->dir_z;
+    s->object = hit.object;
+    s->depth = hit.distance * s->dir_z;
     gn_surface_get_origin(surface, s->org);
     // A shadow is less light on a diffuse surface; real mirrors and glass show other things.
     s->is_receiver = s->kind == SAMPLE_REAL && (surface->material == GN_MATERIAL_DIFFUSE ||
@@ -108,48 +191,21 @@ static void take_hit(const struct frame *frame, struct sample *s, const struct g
     figures->n_receivers += s->is_receiver;
 }
 
-/** Up to 16 samples, neighbours, at once. */
-static void trace_packet(const struct frame *frame, struct sample *samples, int n,
-                         struct tile_figures *figures)
-{
-    struct gn_rt_packet packet;
-    struct gn_rt_hit hits[GN_RT_PACKET];
-    int n_rays = 0;
-    for (int i = 0; i < GN_RT_PACKET; i++) {
-        struct sample *s = &samples[i < n ? i : 0];
-        bool has_ray = i < n && s->dir_z > 0;
-        packet.org_x[i] = frame->origin[0];
-        packet.org_y[i] = frame->origin[1];
-        packet.org_z[i] = frame->origin[2];
-        packet.dir_x[i] = s->dir[0];
-        packet.dir_y[i] = s->dir[1];
-        packet.dir_z[i] = s->dir[2];
-        packet.t_near[i] = 0;
-        packet.t_far[i] = INFINITY;
-        packet.valid[i] = has_ray ? -1 : 0;
-        n_rays += has_ray;
-    }
-    if (n_rays == 0)
-        return;
-    figures->rays_primary += (uint64_t)n_rays;
-    // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
-    uint32_t met = gn_rt_intersect16(frame->rt, GN_RT_ALL, &packet, hits);
-    for (; met != 0; met &= met - 1) {
-        int i = __builtin_ctz(met);
-        take_hit(frame, &samples[i], &hits[i], figures);
-    }
-}
-
 void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
                       struct tile_figures *figures)
 {
-    for (int i = 0; i < n; i++) {
-        struct sample *s = &samples[i];
-        s->kind = SAMPLE_NOTHING;
-        s->depth = INFINITY;
-        s->is_receiver = s->is_cut = s->is_lit = false;
-        s->shown = 0;
+    for (int first = 0; first < n; first += LANES) {
+        struct sight sight;
+        int n_lanes = n - first < LANES ? n - first : LANES;
+        for (int i = 0; i < LANES; i++) {
+            const struct sample *s = &samples[first + (i < n_lanes ? i : 0)];
+            for (int k = 0; k < 3; k++)
+                sight.dir[k][i] = s->dir[k];
+            sight.dir_z[i] = s->dir_z;
+            sight.has_ray[i] = i < n_lanes && s->dir_z > 0;
+        }
+        gn_primary_trace_block(frame, &sight, figures);
+        for (int i = 0; i < n_lanes; i++)
+            gn_primary_take(frame, &sight, i, &samples[first + i], figures);
     }
-    for (int i = 0; i < n; i += GN_RT_PACKET)
-        trace_packet(frame, samples + i, n - i < GN_RT_PACKET ? n - i : GN_RT_PACKET, figures);
 }

@@ -61,8 +61,8 @@ const char *gn_progressive_get_obstacle(const struct gn_scene *scene,
 /**
  * Renders the interactive picture, from which the passes to come begin. Keeps a reference to light;
  * a scene that is changed in the renderer later needs another begin. Takes memory only where the
- * picture, or a map, is larger than before. Returns as gn_renderer_render does. The caller has asked for
- * obstacles.
+ * picture, or a map, is larger than before. Returns as gn_renderer_render does. The caller has
+ * asked for obstacles.
  */
 GN_MUST_USE int
 gn_progressive_begin(struct gn_progressive *progressive, const struct gn_camera *camera,

@@ -8,6 +8,9 @@
 
 #include "server/render/kernels/kernels.h"
 
+/** Fewer rays of a block to a light wait for others, to fill a packet. */
+#define MIN_WIDE 12
+
 static const struct box empty_box = {{INFINITY, INFINITY, INFINITY},
                                      {-INFINITY, -INFINITY, -INFINITY}};
 
@@ -75,6 +78,30 @@ void gn_receivers_flush(const struct frame *frame, struct scratch *scratch, enum
     }
 }
 
+/** A block's lanes as one packet, without a copy of each. */
+static void trace_wide(const struct frame *frame, const struct scratch *scratch, int block,
+                       int light, unsigned lanes, enum gn_rt_set set,
+                       uint16_t (*masks)[GN_LIGHTS_MAX], uint64_t *rays)
+{
+    const struct receivers *r = &scratch->receivers;
+    struct gn_rt_packet packet;
+    float dir[3];
+    gn_render_lights_get_dir(frame->lights, light, dir);
+    memcpy(packet.org_x, r->org[0] + block * LANES, sizeof(packet.org_x));
+    memcpy(packet.org_y, r->org[1] + block * LANES, sizeof(packet.org_y));
+    memcpy(packet.org_z, r->org[2] + block * LANES, sizeof(packet.org_z));
+    for (int i = 0; i < LANES; i++) {
+        packet.dir_x[i] = dir[0];
+        packet.dir_y[i] = dir[1];
+        packet.dir_z[i] = dir[2];
+        packet.t_near[i] = 0;
+        packet.t_far[i] = INFINITY;
+        packet.valid[i] = -(int32_t)(lanes >> i & 1);
+    }
+    *rays += (uint64_t)__builtin_popcount(lanes);
+    masks[block][light] |= (uint16_t)gn_rt_get_occluded16(frame->rt, set, &packet);
+}
+
 void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int block, int light,
                         unsigned lanes, enum gn_rt_set set, uint16_t (*masks)[GN_LIGHTS_MAX],
                         uint64_t *rays)
@@ -82,6 +109,10 @@ void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int 
     const struct receivers *r = &scratch->receivers;
     float dir[3];
     gn_render_lights_get_dir(frame->lights, light, dir);
+    if (__builtin_popcount(lanes) >= MIN_WIDE) {
+        trace_wide(frame, scratch, block, light, lanes, set, masks, rays);
+        return;
+    }
     for (; lanes != 0; lanes &= lanes - 1) {
         int j = block * LANES + __builtin_ctz(lanes);
         const float org[3] = {r->org[0][j], r->org[1][j], r->org[2][j]};
@@ -90,17 +121,14 @@ void gn_receivers_trace(const struct frame *frame, struct scratch *scratch, int 
     }
 }
 
-void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, int block,
-                      const uint16_t *hidden, const uint16_t *cut, bool unweighted,
-                      double out_open[static 3][LANES], double out_cut[static 3][LANES])
+void gn_receivers_sum(const struct frame *frame, const struct receivers *r, int block,
+                      const uint16_t *mask, bool unweighted, double out[static 3][LANES])
 {
     const struct light_list *lights = frame->lights;
-    const struct receivers *r = &scratch->receivers;
     struct gn_kernel_sum sum = {
         .surfaces = get_surfaces(r, block),
         .n = lights->n,
-        .hidden = hidden,
-        .cut = cut,
+        .mask = mask,
         .unweighted = unweighted,
         .n_parts = frame->blend.n,
         .ends = lights->ends,
@@ -111,5 +139,5 @@ void gn_receivers_sum(const struct frame *frame, const struct scratch *scratch, 
         sum.dir[k] = lights->dir[k];
         sum.irradiance[k] = lights->irradiance[k];
     }
-    frame->kernels->sum_lights(&sum, out_open, out_cut);
+    frame->kernels->sum_lights(&sum, out);
 }

@@ -29,10 +29,32 @@ const struct refine_rule gn_refine_rules[3] = {
     [GN_QUALITY_REFERENCE] = {.grid = 4, .radiance = 0.01f, .shadow = 0.01f},
 };
 
-static const struct feature *feature_at(const struct frame *frame, int x, int y)
+bool *gn_refine_plain_at(const struct frame *frame, int x, int y)
 {
+    int stride = frame->tiles_x * BLOCKS;
+    return &frame->plain[(size_t)(y / BLOCK) * (size_t)stride + (size_t)(x / BLOCK)];
+}
+
+bool gn_refine_is_all_plain(const struct frame *frame, int x, int y)
+{
+    for (int dy = -BLOCK; dy <= BLOCK; dy += BLOCK) {
+        for (int dx = -BLOCK; dx <= BLOCK; dx += BLOCK) {
+            bool is_inside = x + dx >= 0 && y + dy >= 0 && x + dx < frame->camera->width &&
+                             y + dy < frame->camera->height;
+            if (is_inside && !*gn_refine_plain_at(frame, x + dx, y + dy))
+                return false;
+        }
+    }
+    return true;
+}
+
+const struct feature *gn_refine_get_feature(const struct frame *frame, int x, int y)
+{
+    static const struct feature plain = {.color = {1, 1, 1}};
     if (x < 0 || y < 0 || x >= frame->camera->width || y >= frame->camera->height)
         return NULL;
+    if (*gn_refine_plain_at(frame, x, y))
+        return &plain;
     return &frame->features[(size_t)y * (size_t)frame->camera->width + (size_t)x];
 }
 
@@ -64,10 +86,10 @@ bool gn_refine_is_needed(const struct frame *frame, int x, int y)
         return false;
     if (frame->options.supersample_all)
         return true;
-    const struct feature *c = feature_at(frame, x, y);
+    const struct feature *c = gn_refine_get_feature(frame, x, y);
     for (int i = 0; i < 4; i++) {
-        const struct feature *a = feature_at(frame, x - lines[i][0], y - lines[i][1]);
-        const struct feature *b = feature_at(frame, x + lines[i][0], y + lines[i][1]);
+        const struct feature *a = gn_refine_get_feature(frame, x - lines[i][0], y - lines[i][1]);
+        const struct feature *b = gn_refine_get_feature(frame, x + lines[i][0], y + lines[i][1]);
         if ((a && a->owner != c->owner) || (b && b->owner != c->owner))
             return true;
         if (has_contrast(frame, a, c, b))

@@ -25,7 +25,8 @@ struct gn_renderer {
     const struct gn_scene *scene; // borrowed
     const struct gn_scene *posed; // borrowed: where its movable objects stand
     uint64_t version;             // of the scene that the boxes are of
-    struct gn_pool *pool;         // borrowed, may be NULL
+    uint64_t n_frames;
+    struct gn_pool *pool; // borrowed, may be NULL
     int n_workers;
     struct scratch *scratches; // [n_workers], owned
     struct light_list lights;
@@ -35,6 +36,7 @@ struct gn_renderer {
     size_t n_pixels; // capacity of what follows
     float *rays;     // [h][w][3], owned
     struct feature *features;
+    bool *plain; // [blocks], see struct frame
     struct tile_figures *figures;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
     double slopes[4];
@@ -113,6 +115,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     gn_caustics_finish(&self->caustics);
     free(self->rays);
     free(self->features);
+    free(self->plain);
     free(self->figures);
     free(self);
 }
@@ -147,11 +150,14 @@ static int reserve_pixels(struct gn_renderer *renderer, int width, int height)
     renderer->rays_camera.width = 0;
     free(renderer->rays);
     free(renderer->features);
+    free(renderer->plain);
     free(renderer->figures);
     renderer->rays = malloc(3 * n * sizeof(*renderer->rays));
     renderer->features = calloc(n, sizeof(*renderer->features));
     renderer->figures = calloc(n_tiles, sizeof(*renderer->figures));
-    return renderer->rays && renderer->features && renderer->figures ? 0 : -ENOMEM;
+    renderer->plain = calloc(n_tiles * BLOCKS * BLOCKS, sizeof(*renderer->plain));
+    return renderer->rays && renderer->features && renderer->plain && renderer->figures ? 0
+                                                                                        : -ENOMEM;
 }
 
 /** The table of rays depends on the intrinsics only. */
@@ -295,6 +301,15 @@ static void init_boxes(struct frame *frame, struct gn_renderer *renderer)
     }
     frame->margin = 1e-5f * largest;
     frame->clusters = renderer->clusters;
+    frame->solid_box = EMPTY_BOX;
+    for (int i = 0; i < frame->clusters[0].n; i++) {
+        const struct cluster *cluster = &frame->clusters[0].cluster[i];
+        for (int k = 0; k < 3 && !cluster->is_flat; k++) {
+            frame->solid_box.min[k] = fminf(frame->solid_box.min[k], cluster->box.min[k]);
+            frame->solid_box.max[k] = fmaxf(frame->solid_box.max[k], cluster->box.max[k]);
+        }
+    }
+    widen_box(&frame->solid_box, frame->margin);
     widen_box(&frame->virtual_box, frame->margin);
     for (int i = 0; i < renderer->blockers.n; i++) {
         renderer->wide_blockers[i] = renderer->blockers.boxes[i];
@@ -324,6 +339,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
             frame->world_from_camera[3 * i + k] = m[4 * i + k];
         frame->origin[i] = (float)m[4 * i + 3];
     }
+    frame->serial = ++renderer->n_frames;
     frame->scene = renderer->posed;
     frame->rt = renderer->posed->rt;
     frame->pixel_angle = (float)(1 / fmax(frame->camera->fx, frame->camera->fy));
@@ -332,6 +348,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->lights = frame->pass ? frame->pass->lights : &renderer->lights;
     frame->places = get_places(renderer, frame);
     frame->features = renderer->features;
+    frame->plain = renderer->plain;
     frame->figures = renderer->figures;
     frame->scratches = renderer->scratches;
     frame->tiles_x = count_tiles(frame->camera->width);
@@ -349,22 +366,23 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     init_light(frame);
 }
 
-/** Silhouettes for the shadow pass that the plan has; the reference has ways of its own. */
+/** Silhouettes for the passes that the plan has; the reference has ways of its own. */
 static int make_silhouettes(struct gn_renderer *renderer, struct frame *frame)
 {
-    if (!frame->run_shadow || !frame->cull || frame->options.quality == GN_QUALITY_REFERENCE)
+    if (!frame->cull || frame->options.quality == GN_QUALITY_REFERENCE)
         return 0;
     for (int i = 0; i < 2; i++) {
         bool is_real = i == 0;
-        const struct silhouette **out =
+        const struct silhouettes **out =
             is_real ? &frame->real_silhouettes : &frame->virtual_silhouettes;
-        if (is_real && !frame->run_blockers)
+        bool shades = is_real && frame->run_light_loop;
+        if (!shades && (!frame->run_shadow || (is_real && !frame->run_blockers)))
             continue;
         int ret = gn_silhouettes_make(&renderer->silhouettes[i], &renderer->clusters[i], is_real,
                                       frame->lights, frame->margin, renderer->pool);
         if (ret < 0)
             return ret;
-        *out = renderer->silhouettes[i].of;
+        *out = &renderer->silhouettes[i];
     }
     return 0;
 }

@@ -107,26 +107,11 @@ static void shade_by_irradiance(const struct frame *frame, struct sample *s)
     reflect_irradiance(s, sum);
 }
 
-/** Adds the light of the packet's free lanes to their samples' irradiance. */
-static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
-                  double (*irradiance)[3], struct tile_figures *figures)
-{
-    int n;
-    uint32_t hidden = gn_packet_trace(frame, scratch, set, &n, &figures->rays_shade);
-    for (int lane = 0; lane < n; lane++) {
-        if (hidden >> lane & 1)
-            continue;
-        double *e = irradiance[scratch->lane_sample[lane]];
-        int light = scratch->lane_light[lane];
-        for (int k = 0; k < 3; k++)
-            e[k] += (double)scratch->lane_weight[lane] * frame->lights->irradiance[k][light];
-    }
-}
-
 void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
                       struct tile_figures *figures)
 {
-    int m = 0;
+    struct receivers *r = &scratch->receivers;
+    gn_receivers_begin(r);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
@@ -135,29 +120,36 @@ void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
         if (frame->options.shading == GN_SHADING_IRRADIANCE)
             shade_by_irradiance(frame, s);
         else
-            scratch->lit[m++] = i;
+            gn_receivers_add(r, scratch->samples, i, frame->blend.n);
     }
-    if (m == 0)
-        return;
-    // Lights outside, samples inside: the 16 rays of a packet are nearly parallel and close.
-    double irradiance[BATCH][3];
-    memset(irradiance, 0, (size_t)m * sizeof(irradiance[0]));
-    const struct light_list *lights = frame->lights;
-    for (int l = 0; l < lights->n; l++) {
-        const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
-        int probe = get_probe(lights, l);
-        for (int j = 0; j < m; j++) {
-            const struct sample *s = &scratch->samples[scratch->lit[j]];
-            float c = surface_cosine(&s->surface, dir);
-            if (frame->blend.n > 1)
-                c *= s->weights[probe];
-            if (c > 0 && gn_packet_add(scratch, s->org, dir, j, l, c, INFINITY))
-                flush(frame, scratch, GN_RT_ALL, irradiance, figures);
+    gn_receivers_end(r, frame->blend.n);
+    gn_occlusion_find_all(frame, scratch, &figures->rays_shade);
+    for (int b = 0; b < r->n_blocks; b++) {
+        double irradiance[3][LANES];
+        for (int l = 0; l < frame->lights->n; l++)
+            scratch->mask[l] = (uint16_t)~scratch->hidden[b][l];
+        gn_receivers_sum(frame, r, b, scratch->mask, false, irradiance);
+        for (int i = 0; i < LANES && b * LANES + i < r->n; i++) {
+            const double e[3] = {irradiance[0][i], irradiance[1][i], irradiance[2][i]};
+            reflect_irradiance(&scratch->samples[r->sample[b * LANES + i]], e);
         }
     }
-    flush(frame, scratch, GN_RT_ALL, irradiance, figures);
-    for (int j = 0; j < m; j++)
-        reflect_irradiance(&scratch->samples[scratch->lit[j]], irradiance[j]);
+}
+
+/** Adds the light of the packet's free lanes. */
+static void flush(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
+                  double irradiance[static 3], struct tile_figures *figures)
+{
+    int n;
+    uint32_t hidden = gn_packet_trace(frame, scratch, set, &n, &figures->rays_shade);
+    for (int lane = 0; lane < n; lane++) {
+        if (hidden >> lane & 1)
+            continue;
+        int light = scratch->lane_light[lane];
+        for (int k = 0; k < 3; k++)
+            irradiance[k] +=
+                (double)scratch->lane_weight[lane] * frame->lights->irradiance[k][light];
+    }
 }
 
 void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
@@ -165,10 +157,10 @@ void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
                              double out_irradiance[static 3], struct tile_figures *figures)
 {
     const struct light_list *lights = frame->lights;
-    double sum[1][3] = {{0}};
+    double sum[3] = {0};
     bool by_map = frame->options.shading == GN_SHADING_IRRADIANCE;
     if (by_map)
-        look_up_irradiance(frame, s, sum[0]);
+        look_up_irradiance(frame, s, sum);
     for (int l = first; l < lights->n && !by_map; l += stride) {
         const float dir[3] = {lights->dir[0][l], lights->dir[1][l], lights->dir[2][l]};
         float c = surface_cosine(&s->surface, dir) * (float)stride;
@@ -191,7 +183,7 @@ void gn_shade_get_irradiance(const struct frame *frame, struct scratch *scratch,
         figures->rays_shade++;
         bool is_hidden = gn_rt_is_occluded(frame->rt, set, s->org, ray.dir, 0, ray.length);
         for (int k = 0; k < 3 && !is_hidden; k++)
-            sum[0][k] += weight * (double)light->intensity[k];
+            sum[k] += weight * (double)light->intensity[k];
     }
-    memcpy(out_irradiance, sum[0], sizeof(sum[0]));
+    memcpy(out_irradiance, sum, sizeof(sum));
 }

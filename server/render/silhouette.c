@@ -299,6 +299,18 @@ static void settle_regions(const struct job *job, const struct projected *projec
     }
 }
 
+/** Copies the axes side by side with the other lights'. */
+static void keep_plane(struct silhouettes *silhouettes, int item)
+{
+    const struct silhouette *s = &silhouettes->of[item];
+    float *to = silhouettes->planes + item;
+    size_t stride = (size_t)silhouettes->capacity;
+    for (int i = 0; i < 6; i++)
+        to[(size_t)i * stride] = s->axis[i / 3][i % 3];
+    for (int i = 0; i < 2; i++)
+        to[(size_t)(6 + i) * stride] = s->offset[i];
+}
+
 static void make_one(void *context, int item, int worker)
 {
     const struct job *job = context;
@@ -310,7 +322,9 @@ static void make_one(void *context, int item, int worker)
         return;
     memset(s, 0, sizeof(*s));
     memcpy(s->dir, dir, sizeof(dir));
-    if (!place_cells(job, s))
+    bool is_any = place_cells(job, s);
+    keep_plane(job->silhouettes, item);
+    if (!is_any)
         return;
     // In cells; and the rounding of cells' numbers themselves, of up to SIDE.
     float half[2];
@@ -338,10 +352,13 @@ static int reserve(struct silhouettes *silhouettes, int n, int n_workers)
             wide *= 2;
         n = wide;
         free(silhouettes->of);
+        free(silhouettes->planes);
         silhouettes->n = silhouettes->capacity = 0;
         silhouettes->of = malloc((size_t)n * sizeof(*silhouettes->of));
-        if (!silhouettes->of)
+        silhouettes->planes = aligned_alloc(64, 8 * (size_t)n * sizeof(float));
+        if (!silhouettes->of || !silhouettes->planes)
             return -ENOMEM;
+        memset(silhouettes->planes, 0, 8 * (size_t)n * sizeof(float)); // lanes that no light has
         silhouettes->capacity = n;
     }
     if (silhouettes->projected)
@@ -373,8 +390,32 @@ void gn_silhouettes_forget(struct silhouettes *silhouettes)
 void gn_silhouettes_finish(struct silhouettes *silhouettes)
 {
     free(silhouettes->of);
+    free(silhouettes->planes);
     free(silhouettes->projected);
     memset(silhouettes, 0, sizeof(*silhouettes));
+}
+
+int gn_silhouettes_list(const struct frame *frame, const struct silhouettes *silhouettes,
+                        const struct box *box, int16_t out_lights[static GN_LIGHTS_MAX])
+{
+    int n_lights = frame->lights->n;
+    int n = 0;
+    for (int first = 0; first < n_lights; first += LANES) {
+        const float *at = silhouettes->planes + first;
+        size_t stride = (size_t)silhouettes->capacity;
+        struct gn_kernel_planes planes;
+        for (int i = 0; i < 6; i++)
+            planes.axis[i / 3][i % 3] = at + (size_t)i * stride;
+        for (int i = 0; i < 2; i++)
+            planes.offset[i] = at + (size_t)(6 + i) * stride;
+        unsigned lanes = frame->kernels->get_overlaps(&planes, SIDE, box->min, box->max);
+        for (; lanes != 0; lanes &= lanes - 1) {
+            int l = first + __builtin_ctz(lanes);
+            if (l < n_lights && gn_silhouette_get_box(&silhouettes->of[l], box) != SILHOUETTE_FREE)
+                out_lights[n++] = (int16_t)l;
+        }
+    }
+    return n;
 }
 
 enum silhouette_state gn_silhouette_get_box(const struct silhouette *s, const struct box *box)

@@ -29,6 +29,7 @@ struct silhouette {
 struct silhouettes {
     int n, capacity;
     struct silhouette *of;       // [n], owned
+    float *planes;               // [8][capacity] their axes (6) and offsets (2), owned
     struct projected *projected; // [workers of the pool] working memory, owned
 };
 
@@ -45,6 +46,11 @@ GN_MUST_USE int gn_silhouettes_make(struct silhouettes *silhouettes,
                                     const struct light_list *lights, float margin,
                                     struct gn_pool *pool);
 
+/** Lists the lights of which lines through points of the box may meet the set. Returns their
+ * number.
+ */
+int gn_silhouettes_list(const struct frame *frame, const struct silhouettes *silhouettes,
+                        const struct box *box, int16_t out_lights[static GN_LIGHTS_MAX]);
 /** Of all lines through points of the box. */
 enum silhouette_state gn_silhouette_get_box(const struct silhouette *s, const struct box *box);
 /** Of a block's 16 receivers. bits: of *out_dark, *out_edge; the others are free. */

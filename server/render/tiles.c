@@ -49,13 +49,10 @@ void gn_tiles_light_samples(const struct frame *frame, struct scratch *scratch, 
     figures->s_shadow += 1e-9 * (double)(t3 - t2);
 }
 
-/** What each of the n samples sees, and its light. */
+/** Light of the samples, and what they show. */
 static void process_samples(const struct frame *frame, struct scratch *scratch, int n, int n_paths,
                             struct tile_figures *figures)
 {
-    int64_t start = gn_clock_get_monotonic_ns();
-    gn_primary_trace(frame, scratch->samples, n, figures);
-    figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
     gn_tiles_light_samples(frame, scratch, n, n_paths, figures);
     if (frame->run_optics)
         gn_optics_samples(frame, scratch, n, n_paths, figures);
@@ -84,18 +81,83 @@ static void keep_feature(const struct frame *frame, int x, int y, const struct s
                                                 : 1);
 }
 
-/** A tile's pixels, in squares of 4 x 4 so that a block of 16 receivers is compact. */
-static int list_pixels(const struct frame *frame, int item, int (*out_pixels)[2])
+/** Writes a block of pixels that show nothing of the virtual objects. */
+static void write_plain(const struct frame *frame, int x, int y, const struct sight *sight,
+                        struct tile_figures *figures)
 {
+    float depth[LANES];
+    for (int i = 0; i < LANES; i++) {
+        bool is_met = sight->hits.met >> i & 1;
+        depth[i] = is_met ? sight->hits.distance[i] * sight->dir_z[i] : INFINITY;
+    }
+    gn_layers_write_plain(frame, x, y, depth);
+    figures->n_receivers += (uint64_t)__builtin_popcount(sight->hits.met);
+}
+
+/** Where a block's pixels are. */
+static void get_corner(const struct frame *frame, int item, int block, int *out_x, int *out_y)
+{
+    *out_x = item % frame->tiles_x * TILE + block % BLOCKS * BLOCK;
+    *out_y = item / frame->tiles_x * TILE + block / BLOCKS * BLOCK;
+}
+
+/** Traces the rays of a tile's pixels. out_boxes: of what blocks see, out_known: where it is
+ * known. */
+static void trace_tile(const struct frame *frame, struct scratch *scratch, int item,
+                       struct box *out_boxes, bool *out_known, struct tile_figures *figures)
+{
+    struct box tile = EMPTY_BOX;
+    for (int b = 0; b < BLOCKS * BLOCKS; b++) {
+        struct sight *sight = &scratch->sights[b];
+        int x;
+        int y;
+        get_corner(frame, item, b, &x, &y);
+        gn_primary_aim_block(frame, x, y, sight);
+        gn_primary_trace_block(frame, sight, figures);
+        out_known[b] = frame->skips && gn_primary_bound(frame, sight, &out_boxes[b]);
+        for (int k = 0; k < 3 && out_known[b]; k++) {
+            tile.min[k] = fminf(tile.min[k], out_boxes[b].min[k]);
+            tile.max[k] = fmaxf(tile.max[k], out_boxes[b].max[k]);
+        }
+    }
+    scratch->n_shadow_lights = 0;
+    if (frame->run_shadow && tile.min[0] <= tile.max[0])
+        gn_shadow_list_lights(frame, scratch, &tile);
+}
+
+/** Takes what a tile's pixels see where it is not plain. Returns the number of samples. */
+static int see_tile(const struct frame *frame, struct scratch *scratch, int item, int (*pixels)[2],
+                    struct tile_figures *figures)
+{
+    struct box boxes[BLOCKS * BLOCKS];
+    bool is_known[BLOCKS * BLOCKS];
     int n = 0;
-    for (int i = 0; i < BATCH; i++) {
-        int square = i / 16;
-        int x = item % frame->tiles_x * TILE + square % 4 * 4 + i % 4;
-        int y = item / frame->tiles_x * TILE + square / 4 * 4 + i % 16 / 4;
-        if (x >= frame->camera->width || y >= frame->camera->height)
+    trace_tile(frame, scratch, item, boxes, is_known, figures);
+    for (int b = 0; b < BLOCKS * BLOCKS; b++) {
+        const struct sight *sight = &scratch->sights[b];
+        int corner[2];
+        get_corner(frame, item, b, &corner[0], &corner[1]);
+        if (corner[0] >= frame->camera->width || corner[1] >= frame->camera->height)
             continue;
-        out_pixels[n][0] = x;
-        out_pixels[n++][1] = y;
+        bool plain = is_known[b] && (!frame->run_shadow || sight->hits.met == 0 ||
+                                     gn_shadow_is_free(frame, scratch, &boxes[b]));
+        *gn_refine_plain_at(frame, corner[0], corner[1]) = plain;
+        if (plain) {
+            write_plain(frame, corner[0], corner[1], sight, figures);
+            continue;
+        }
+        for (int i = 0; i < LANES; i++) {
+            int x = corner[0] + i % BLOCK;
+            int y = corner[1] + i / BLOCK;
+            if (x >= frame->camera->width || y >= frame->camera->height)
+                continue;
+            struct sample *s = &scratch->samples[n];
+            gn_primary_take(frame, sight, i, s, figures);
+            s->group = n;
+            init_sample(frame, s, x, y, 0);
+            pixels[n][0] = x;
+            pixels[n++][1] = y;
+        }
     }
     return n;
 }
@@ -106,18 +168,12 @@ static void render_centres(void *context, int item, int worker)
     struct scratch *scratch = &frame->scratches[worker];
     struct tile_figures *figures = &frame->figures[item];
     int pixels[BATCH][2];
-    int n = list_pixels(frame, item, pixels);
     memset(figures, 0, sizeof(*figures));
-    for (int i = 0; i < n; i++) {
-        struct sample *s = &scratch->samples[i];
-        int x = pixels[i][0];
-        int y = pixels[i][1];
-        s->group = i;
-        init_sample(frame, s, x, y, 0);
-        gn_primary_aim(frame,
-                       frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
-    }
-    process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
+    int64_t start = gn_clock_get_monotonic_ns();
+    int n = see_tile(frame, scratch, item, pixels, figures);
+    figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
+    if (n > 0)
+        process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
     for (int i = 0; i < n; i++) {
         const struct sample *s = &scratch->samples[i];
         int x = pixels[i][0];
@@ -154,6 +210,9 @@ static void refine_pixels(const struct frame *frame, struct scratch *scratch, in
         gn_primary_aim(frame, narrow, s);
     }
     int n_paths = (frame->options.paths_per_pixel + parts - 1) / parts;
+    int64_t start = gn_clock_get_monotonic_ns();
+    gn_primary_trace(frame, scratch->samples, n * parts, figures);
+    figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
     process_samples(frame, scratch, n * parts, n_paths, figures);
     for (int i = 0; i < n; i++)
         gn_layers_resolve(frame, pixels[i][0], pixels[i][1], scratch->samples + i * parts, parts);
@@ -167,13 +226,35 @@ static void count_pixel(const struct frame *frame, int x, int y, struct tile_fig
     figures->n_shadow_pixels += shadow[0] < 1 || shadow[1] < 1 || shadow[2] < 1;
 }
 
+/** Pixels of a tile that need the grid or show something: those of blocks that are not plain, or
+ * next to one that is not. */
+static int list_pixels(const struct frame *frame, int item, int (*out_pixels)[2])
+{
+    int n = 0;
+    for (int b = 0; b < BLOCKS * BLOCKS; b++) {
+        int x;
+        int y;
+        get_corner(frame, item, b, &x, &y);
+        if (x >= frame->camera->width || y >= frame->camera->height ||
+            gn_refine_is_all_plain(frame, x, y))
+            continue;
+        for (int i = 0; i < LANES; i++) {
+            out_pixels[n][0] = x + i % BLOCK;
+            out_pixels[n][1] = y + i / BLOCK;
+            n +=
+                out_pixels[n][0] < frame->camera->width && out_pixels[n][1] < frame->camera->height;
+        }
+    }
+    return n;
+}
+
 static void render_edges(void *context, int item, int worker)
 {
     const struct frame *frame = context;
     struct scratch *scratch = &frame->scratches[worker];
     struct tile_figures *figures = &frame->figures[item];
     int parts = frame->rule.grid * frame->rule.grid;
-    int pixels[BATCH][2];
+    int pixels[BATCH + 1][2];
     int edges[BATCH][2];
     int n_edges = 0;
     int n = list_pixels(frame, item, pixels);

@@ -62,6 +62,18 @@ struct gn_rt_packet {
     _Alignas(64) int32_t valid[GN_RT_PACKET]; // -1 traced, 0 not
 };
 
+/** What a packet's rays have met, as the tracer has it; the rest of a hit costs more than the ray.
+ */
+struct gn_rt_packet_hits {
+    uint32_t met; // bit i: lane i is valid and has met something; other lanes say nothing
+    float distance[GN_RT_PACKET];
+    float u[GN_RT_PACKET], v[GN_RT_PACKET];
+    uint32_t object[GN_RT_PACKET];
+    uint32_t triangle[GN_RT_PACKET];
+    uint32_t mesh[GN_RT_PACKET];  // rt's own number of the mesh,
+    uint32_t mover[GN_RT_PACKET]; // or of what moves; UINT32_MAX: rests
+};
+
 /** Creates an empty scene. Returns 0, -ENOMEM, -EIO (the tracer could not start). */
 GN_MUST_USE int gn_rt_create(struct gn_rt **out_rt, struct gn_error *out_error);
 /** NULL-safe; nulls *rt. */
@@ -117,12 +129,16 @@ bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org
                      const float dir[static 3], float t_near, float t_far,
                      struct gn_rt_hit *out_hit);
 
-/** The nearest hits of up to 16 rays at once; bit i of the result: lane i is valid and has met
- * something; the others of out_hits[16] are untouched. A hit's last bits may differ from those that
+/** The nearest hits of up to 16 rays at once. A hit's last bits may differ from those that
  * gn_rt_intersect finds. */
-uint32_t gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
-                           const struct gn_rt_packet *packet,
-                           struct gn_rt_hit out_hits[static GN_RT_PACKET]);
+void gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
+                       const struct gn_rt_packet *packet, struct gn_rt_packet_hits *out_hits);
+/** All of one of them; lane is set in hits->met. */
+void gn_rt_get_hit(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits, int lane,
+                   struct gn_rt_hit *out_hit);
+/** Bounds of all their points, m, world; min > max: none. */
+void gn_rt_bound_points(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits,
+                        float out_min[static 3], float out_max[static 3]);
 
 /** True where anything lies in (t_near, t_far). dir unit. */
 bool gn_rt_is_occluded(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],

@@ -92,37 +92,75 @@ static void to_world(const float m[static 12], const double p[static 3], double 
         out[k] = m[k] * p[0] + m[3 + k] * p[1] + m[6 + k] * p[2] + w * m[9 + k];
 }
 
+/** A triangle's first corner and the ways to the others, in its own coordinates. */
+struct spot {
+    double v0[3], e1[3], e2[3];
+};
+
+static struct spot get_spot(const struct rt_mesh *mesh, uint32_t triangle)
+{
+    const uint32_t *index = mesh->triangles + 3 * (size_t)triangle;
+    const float *v0 = mesh->vertices + 3 * (size_t)index[0];
+    const float *v1 = mesh->vertices + 3 * (size_t)index[1];
+    const float *v2 = mesh->vertices + 3 * (size_t)index[2];
+    struct spot spot;
+    for (int k = 0; k < 3; k++) {
+        spot.v0[k] = v0[k];
+        spot.e1[k] = (double)v1[k] - v0[k];
+        spot.e2[k] = (double)v2[k] - v0[k];
+    }
+    return spot;
+}
+
+/** The point at barycentric u, v. */
+static inline void get_point(const struct spot *spot, float u, float v, double out[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = spot->v0[k] + (double)u * spot->e1[k] + (double)v * spot->e2[k];
+}
+
+/** The largest of these, 0 at least. */
+static inline double max2(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/** Largest coordinate of the way from p to a corner of its triangle. */
+static double get_extent(const struct rt_mesh *mesh, uint32_t triangle, const double p[static 3])
+{
+    const uint32_t *index = mesh->triangles + 3 * (size_t)triangle;
+    double extent = 0;
+    for (int i = 0; i < 3; i++) {
+        const float *v = mesh->vertices + 3 * (size_t)index[i];
+        for (int k = 0; k < 3; k++)
+            extent = max2(extent, fabs(v[k] - p[k]));
+    }
+    return extent;
+}
+
 /** Point, normal and clearance from the triangle's own vertices, in double, rounded once. */
 static void fill_hit(const struct rt_mesh *mesh, const struct rt_stand *stand,
                      struct gn_rt_hit *hit)
 {
-    const uint32_t *index = mesh->triangles + 3 * (size_t)hit->triangle;
-    const float *v0 = mesh->vertices + 3 * (size_t)index[0];
-    const float *v1 = mesh->vertices + 3 * (size_t)index[1];
-    const float *v2 = mesh->vertices + 3 * (size_t)index[2];
-    double e1[3];
-    double e2[3];
+    const struct spot spot = get_spot(mesh, hit->triangle);
+    const double *e1 = spot.e1;
+    const double *e2 = spot.e2;
+    double own[3];
     double p[3];
-    double magnitude = 0.0;
-    double extent = 0.0;
-    for (int k = 0; k < 3; k++) {
-        e1[k] = (double)v1[k] - v0[k];
-        e2[k] = (double)v2[k] - v0[k];
-        p[k] = v0[k] + (double)hit->u * e1[k] + (double)hit->v * e2[k];
-        extent =
-            fmax(extent, fmax(fabs(v0[k] - p[k]), fmax(fabs(v1[k] - p[k]), fabs(v2[k] - p[k]))));
-    }
+    get_point(&spot, hit->u, hit->v, own);
+    memcpy(p, own, sizeof(p));
     double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2],
                    e1[0] * e2[1] - e1[1] * e2[0]};
+    double extent = get_extent(mesh, hit->triangle, own);
+    double magnitude = 0;
     if (stand) {
-        const double own[3] = {p[0], p[1], p[2]};
         const double own_n[3] = {n[0], n[1], n[2]};
         to_world(stand->world_from_own, own, 1.0, p);
         to_world(stand->world_from_own, own_n, 0.0, n);
     }
     for (int k = 0; k < 3; k++) {
         hit->point[k] = (float)p[k];
-        magnitude = fmax(magnitude, fabs(p[k]));
+        magnitude = max2(magnitude, fabs(p[k]));
     }
     hit->clearance = (float)(FLT_EPSILON * (4.0 * magnitude + 16.0 * extent));
     if (stand)
@@ -134,15 +172,24 @@ static void fill_hit(const struct rt_mesh *mesh, const struct rt_stand *stand,
         hit->normal[k] = (float)(n[k] * scale);
 }
 
-/** The hit of a triangle of a mesh or, where mover is not RTC_INVALID_GEOMETRY_ID, of a mover. */
+/** The mesh of a geometry or, where mover is not RTC_INVALID_GEOMETRY_ID, of a mover. */
+static const struct rt_mesh *get_mesh(const struct gn_rt *rt, unsigned mover, unsigned geometry)
+{
+    return mover != RTC_INVALID_GEOMETRY_ID ? &rt->movers[mover].mesh : &rt->meshes[geometry];
+}
+
+static const struct rt_stand *get_stand(const struct gn_rt *rt, unsigned mover)
+{
+    return mover != RTC_INVALID_GEOMETRY_ID ? &rt->stands[mover] : NULL;
+}
+
 static void make_hit(const struct gn_rt *rt, unsigned mover, unsigned geometry, unsigned triangle,
                      float distance, float u, float v, struct gn_rt_hit *out_hit)
 {
-    bool moves = mover != RTC_INVALID_GEOMETRY_ID;
-    const struct rt_mesh *mesh = moves ? &rt->movers[mover].mesh : &rt->meshes[geometry];
+    const struct rt_mesh *mesh = get_mesh(rt, mover, geometry);
     *out_hit = (struct gn_rt_hit){
         .distance = distance, .u = u, .v = v, .object = mesh->object, .triangle = triangle};
-    fill_hit(mesh, moves ? &rt->stands[mover] : NULL, out_hit);
+    fill_hit(mesh, get_stand(rt, mover), out_hit);
 }
 
 bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],
@@ -184,13 +231,11 @@ static void fill_rays(const struct gn_rt_packet *packet, struct RTCRay16 *ray)
     }
 }
 
-uint32_t gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
-                           const struct gn_rt_packet *packet,
-                           struct gn_rt_hit out_hits[static GN_RT_PACKET])
+void gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
+                       const struct gn_rt_packet *packet, struct gn_rt_packet_hits *out_hits)
 {
     assert(rt->is_committed);
     struct RTCRayHit16 rayhit;
-    uint32_t met = 0;
     fill_rays(packet, &rayhit.ray);
     for (int i = 0; i < GN_RT_PACKET; i++)
         rayhit.hit.geomID[i] = rayhit.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
@@ -198,14 +243,56 @@ uint32_t gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
         trace_intersect16(packet->valid, rt->scenes[set - 1], false, &rayhit);
     if (rt->moving[set - 1])
         trace_intersect16(packet->valid, rt->moving[set - 1], true, &rayhit);
+    memcpy(out_hits->distance, rayhit.ray.tfar, sizeof(out_hits->distance));
+    memcpy(out_hits->u, rayhit.hit.u, sizeof(out_hits->u));
+    memcpy(out_hits->v, rayhit.hit.v, sizeof(out_hits->v));
+    memcpy(out_hits->triangle, rayhit.hit.primID, sizeof(out_hits->triangle));
+    memcpy(out_hits->mesh, rayhit.hit.geomID, sizeof(out_hits->mesh));
+    memcpy(out_hits->mover, rayhit.hit.instID[0], sizeof(out_hits->mover));
+    out_hits->met = 0;
     for (int i = 0; i < GN_RT_PACKET; i++) {
         if (packet->valid[i] == 0 || rayhit.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID)
             continue;
-        make_hit(rt, rayhit.hit.instID[0][i], rayhit.hit.geomID[i], rayhit.hit.primID[i],
-                 rayhit.ray.tfar[i], rayhit.hit.u[i], rayhit.hit.v[i], &out_hits[i]);
-        met |= 1u << i;
+        out_hits->met |= 1u << i;
+        out_hits->object[i] = get_mesh(rt, out_hits->mover[i], out_hits->mesh[i])->object;
     }
-    return met;
+}
+
+void gn_rt_get_hit(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits, int lane,
+                   struct gn_rt_hit *out_hit)
+{
+    make_hit(rt, hits->mover[lane], hits->mesh[lane], hits->triangle[lane], hits->distance[lane],
+             hits->u[lane], hits->v[lane], out_hit);
+}
+
+void gn_rt_bound_points(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits,
+                        float out_min[static 3], float out_max[static 3])
+{
+    struct spot spot = {{0}};
+    int last = -1;
+    for (int k = 0; k < 3; k++) {
+        out_min[k] = INFINITY;
+        out_max[k] = -INFINITY;
+    }
+    for (uint32_t met = hits->met; met != 0; met &= met - 1) {
+        int i = __builtin_ctz(met);
+        const struct rt_stand *stand = get_stand(rt, hits->mover[i]);
+        if (last < 0 || hits->triangle[i] != hits->triangle[last] ||
+            hits->mesh[i] != hits->mesh[last] || hits->mover[i] != hits->mover[last])
+            spot = get_spot(get_mesh(rt, hits->mover[i], hits->mesh[i]), hits->triangle[i]);
+        double own[3];
+        double p[3];
+        get_point(&spot, hits->u[i], hits->v[i], own);
+        memcpy(p, own, sizeof(p));
+        if (stand)
+            to_world(stand->world_from_own, own, 1.0, p);
+        for (int k = 0; k < 3; k++) {
+            float x = (float)p[k];
+            out_min[k] = x < out_min[k] ? x : out_min[k];
+            out_max[k] = x > out_max[k] ? x : out_max[k];
+        }
+        last = i;
+    }
 }
 
 bool gn_rt_is_occluded(const struct gn_rt *rt, enum gn_rt_set set, const float org[static 3],

@@ -152,33 +152,43 @@ static void test_mirroring_keeps_the_winding_normal_outside(void **state)
     gn_rt_destroy(&rt);
 }
 
-/** The packet's nearest hits are those of its rays one by one; idle lanes are left alone. */
+/** The packet's nearest hits are those of its rays one by one; idle lanes meet nothing. */
 static void check_nearest(const struct gn_rt *rt, const struct gn_rt_packet *packet)
 {
-    struct gn_rt_hit hits[GN_RT_PACKET];
-    memset(hits, 0x5a, sizeof(hits));
-    const struct gn_rt_hit untouched = hits[0];
-    uint32_t met = gn_rt_intersect16(rt, GN_RT_ALL, packet, hits);
+    struct gn_rt_packet_hits hits;
+    float low[3] = {INFINITY, INFINITY, INFINITY};
+    float high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    float min[3];
+    float max[3];
+    gn_rt_intersect16(rt, GN_RT_ALL, packet, &hits);
     for (int i = 0; i < GN_RT_PACKET; i++) {
         const float org[3] = {packet->org_x[i], packet->org_y[i], packet->org_z[i]};
         const float dir[3] = {packet->dir_x[i], packet->dir_y[i], packet->dir_z[i]};
-        struct gn_rt_hit hit = untouched;
+        struct gn_rt_hit hit;
+        struct gn_rt_hit wide;
         bool expected =
             packet->valid[i] != 0 &&
             gn_rt_intersect(rt, GN_RT_ALL, org, dir, packet->t_near[i], packet->t_far[i], &hit);
-        assert_int_equal(met >> i & 1, expected);
-        if (!expected) {
-            assert_memory_equal(&hits[i], &untouched, sizeof(untouched));
+        assert_int_equal(hits.met >> i & 1, expected);
+        if (!expected)
             continue;
-        }
-        assert_int_equal(hits[i].object, hit.object);
-        assert_int_equal(hits[i].triangle, hit.triangle);
-        assert_float_equal(hits[i].distance, hit.distance, 1e-5);
+        gn_rt_get_hit(rt, &hits, i, &wide);
+        assert_int_equal(hits.object[i], hit.object);
+        assert_int_equal(wide.object, hit.object);
+        assert_int_equal(wide.triangle, hit.triangle);
+        assert_float_equal(wide.distance, hit.distance, 1e-5);
         for (int k = 0; k < 3; k++) {
-            assert_float_equal(hits[i].point[k], hit.point[k], 1e-5);
-            assert_float_equal(hits[i].normal[k], hit.normal[k], 0);
+            low[k] = wide.point[k] < low[k] ? wide.point[k] : low[k];
+            high[k] = wide.point[k] > high[k] ? wide.point[k] : high[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            assert_float_equal(wide.point[k], hit.point[k], 1e-5);
+            assert_float_equal(wide.normal[k], hit.normal[k], 0);
         }
     }
+    gn_rt_bound_points(rt, &hits, min, max);
+    assert_memory_equal(min, low, sizeof(low));
+    assert_memory_equal(max, high, sizeof(high));
 }
 
 static void test_packet_agrees_with_single_rays(void **state)

@@ -35,13 +35,30 @@ struct gn_kernel_sum {
     int n;                      // lights
     const float *dir[3];        // [n] each, unit
     const float *irradiance[3]; // [n] each
-    const uint16_t *hidden;     // [n] bit i: lane i does not see the light
-    const uint16_t *cut;        // [n] bit i: of what it sees, the second sums take it
+    const uint16_t *mask;       // [n] bit i: lane i takes the light; NULL: all do
     int unweighted;             // true: no cosine, all lights above the horizon count alike
     int n_parts;                // lights' parts, that of each ends at ends[part]; 1: no weights
     const int *ends;
     const float *weights; // [n_parts][weights_stride]: of a part, first 16
     int weights_stride;
+};
+
+/** Two axes of 16 planes, each [16]. */
+struct gn_kernel_planes {
+    const float *axis[2][3];
+    const float *offset[2];
+};
+
+/** Planes of 16 points across normals, each [16]. */
+struct gn_kernel_horizons {
+    const float *org[3];
+    const float *normal[3];
+};
+
+/** 16 boxes, m; each [16]. */
+struct gn_kernel_boxes {
+    const float *min[3];
+    const float *max[3];
 };
 
 struct gn_kernels {
@@ -51,13 +68,27 @@ struct gn_kernels {
                         float out[static GN_KERNEL_LANES]);
     /** Bit i: that is > 0. */
     unsigned (*get_lit)(const struct gn_kernel_surfaces *surfaces, const float dir[static 3]);
-    /** Irradiance per channel: out_open of all lights that are seen, out_cut of those of them that
-     * are cut. */
-    void (*sum_lights)(const struct gn_kernel_sum *sum, double out_open[static 3][16],
-                       double out_cut[static 3][16]);
+    /** Irradiance per channel, of the lights that the mask takes. */
+    void (*sum_lights)(const struct gn_kernel_sum *sum, double out[static 3][16]);
     /** Bit i: unless all rays from the origin with a direction of box i surely miss the box. */
     unsigned (*meet)(const struct direction_boxes *boxes, const float min[static 3],
                      const float max[static 3]);
+    /** Bit i: some of the points p[3][index[n]] is above the i-th plane by more than -slack. sign
+     * -1: under it, by that. */
+    unsigned (*get_above)(const struct gn_kernel_horizons *horizons, double sign,
+                          const float *const p[static 3], const uint16_t *index, int n,
+                          double slack);
+    /** Row-major matrix m[9] times 16 vectors. */
+    void (*turn)(const double m[static 9], const float *const from[static 3],
+                 float *const to[static 3]);
+    /** Bit i: unless all rays of direction dir (unit) from points of the box surely miss the i-th
+     * box. No number is NaN, none of the boxes' is infinite. */
+    unsigned (*meet_boxes)(const struct gn_kernel_boxes *boxes, const float min[static 3],
+                           const float max[static 3], const float dir[static 3]);
+    /** Bit i: unless axis . p + offset of all points p of the box is outside [0, side), by one of
+     * the i-th plane's axes. */
+    unsigned (*get_overlaps)(const struct gn_kernel_planes *planes, float side,
+                             const float min[static 3], const float max[static 3]);
     /** axis . p + offset of 16 points, rounded towards 0; far outside [0, 64) anything there. */
     void (*get_cells)(const float axis[static 3], float offset, const float *const p[static 3],
                       int32_t out[static GN_KERNEL_LANES]);
