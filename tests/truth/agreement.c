@@ -542,12 +542,25 @@ static void test_glass(void **state)
     run(&s, "glass, 1 bounce");
 }
 
+/* Caustics: photons and walks here, walks alone in the rig. */
+static void test_glass_layers(void **state)
+{
+    const struct scenario s = {.paint = paint_both,
+                               .map_height = 64,
+                               .bounces = 1,
+                               .n_paths = 512,
+                               .finish = GN_RIG_GLASS};
+    (void)state;
+    run(&s, "glass, layers, 1 bounce");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_glossy_metal),
         cmocka_unit_test(test_glossy_lacquer),
         cmocka_unit_test(test_glass),
+        cmocka_unit_test(test_glass_layers),
         cmocka_unit_test(test_whole_sky),
         cmocka_unit_test(test_whole_lamps),
         cmocka_unit_test(test_whole_bounces),
