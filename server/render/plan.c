@@ -17,13 +17,14 @@ enum line {
     ADDED,
     OPTICS,
     CAUSTICS,
+    BOUNCES,
     N_LINES
 };
 
 static const char *const pass_names[N_LINES] = {
     [PRIMARY] = "primary", [REFINE] = "refine", [SHADE] = "shade",       [MIRROR] = "mirror",
     [GLOSSY] = "glossy",   [SHADOW] = "shadow", [BLOCKERS] = "blockers", [NEAR] = "near",
-    [ADDED] = "added",     [OPTICS] = "optics", [CAUSTICS] = "caustics",
+    [ADDED] = "added",     [OPTICS] = "optics", [CAUSTICS] = "caustics", [BOUNCES] = "bounces",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -165,6 +166,18 @@ static const char *why_not_caustics(const struct frame *frame)
     return NULL;
 }
 
+/** Indirect light. What virtual objects send on of the light they receive, colour bleeding, takes a
+ * walk's length of noisy rays from every receiver; an interactive frame has none for it. */
+static const char *why_not_bounces(const struct frame *frame)
+{
+    if (frame->run_bounces)
+        return NULL;
+    return frame->options.quality == GN_QUALITY_REFERENCE
+               ? "0 bounces were asked for"
+               : "indirect light, such as colour bleeding, is of the reference quality: it takes "
+                 "hundreds of rays from each pixel";
+}
+
 static const char *why_added(const struct frame *frame)
 {
     return frame->near.n_virtual > 0 ? "light of virtual lamps and screens on real surfaces"
@@ -219,15 +232,17 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     frame->run_caustics = !no_caustics;
     set_line(report, CAUSTICS, no_caustics,
              "virtual mirrors or glass may throw light onto real ones");
-    bool can_add = frame->run_bounces || frame->near.n_virtual > 0 || frame->run_caustics;
-    const char *no_added =
-        !can_add ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
-        : frame->run_caustics ? NULL
-                              : no_shadow;
-    set_line(report, ADDED, no_added, why_added(frame));
     const char *no_optics = why_not_optics(frame);
     frame->run_optics = !no_optics;
     set_line(report, OPTICS, no_optics, "a real mirror or glass may show virtual objects");
+    set_line(report, BOUNCES, why_not_bounces(frame), "bounces were asked for");
+    bool can_add = frame->run_bounces || frame->near.n_virtual > 0;
+    const char *no_added =
+        frame->run_caustics || frame->run_optics ? NULL
+        : !can_add
+            ? "0 bounces: nothing is added; light by way of mirrors and glass is not followed"
+            : no_shadow;
+    set_line(report, ADDED, no_added, why_added(frame));
 }
 
 /** The pass was ready to run and found no work. */
@@ -255,5 +270,6 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
              "no light's ray from a pixel comes near a virtual object");
     withdraw(report, CAUSTICS, frame->n_photons == 0, "the camera sees none");
     withdraw(report, OPTICS, sum->n_optics == 0, "no real mirror or glass in view");
-    withdraw(report, ADDED, sum->n_receivers == 0, "no diffuse real surface in view");
+    withdraw(report, ADDED, sum->n_receivers + sum->n_optics == 0,
+             "no diffuse real surface in view");
 }
