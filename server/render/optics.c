@@ -307,7 +307,8 @@ void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n
 {
     struct optics *optics = scratch->optics;
     bool is_summed[BATCH] = {false}; // by group
-    bool is_grid = n > 1 && scratch->samples[1].group == scratch->samples[0].group;
+    // Then every base is weighed.
+    bool is_grid = frame->pass || (n > 1 && scratch->samples[1].group == scratch->samples[0].group);
     uint64_t n_before = figures->n_optics;
     int n_facets = frame->options.quality == GN_QUALITY_REFERENCE ? REFERENCE_FACETS : FACETS;
     if (frame->run_shadow)

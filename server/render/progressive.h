@@ -5,9 +5,9 @@
  * renderer: one ray through another point of each pixel, and lights drawn anew from the whole maps
  * (draw.h), near light and glossy reflection by random choice. Sums over the passes are taken
  * before the shadow's ratio is, so that what is shown tends to what the reference quality shows
- * without bounces, every pixel having rays all over it. Passes come in rounds of four; after each
- * round the picture is the best mean of the interactive one, which it starts from, and the sums
- * (sums.h): the first is no worse, and there is no jump to the next.
+ * without bounces and caustics, every pixel having rays all over it. Passes come in rounds of four;
+ * after each round the picture is the best mean of the interactive one, which it starts from, and
+ * the sums (sums.h): the first is no worse, and there is no jump to the next.
  */
 #ifndef GN_SERVER_RENDER_PROGRESSIVE_H
 #define GN_SERVER_RENDER_PROGRESSIVE_H
