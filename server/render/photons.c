@@ -11,6 +11,8 @@
 
 /** Pixels for each photon of each of paths_per_pixel. */
 #define PIXELS 8
+/** Of the square that a photon is chosen in. */
+#define JITTER (1.0 / 32)
 
 static bool is_clear(const struct gn_scene_object *object)
 {
@@ -202,12 +204,13 @@ bool gn_photons_send(const struct photon_job *job, uint64_t i, struct photon *ph
                      uint32_t *out_object, int *out_light, uint64_t *rays)
 {
     // Points of the sequence R3, turned (Roberts, "The Unreasonable Effectiveness of Quasirandom
-    // Sequences", 2018).
+    // Sequences", 2018): even over the whole; shaken by JITTER, or their lattice would show.
     static const double steps[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
     const struct caustic_target *target = NULL;
+    uint64_t random = (job->frame->options.seed + 1) * UINT64_C(0x9e6c63d0876a9a47) ^ (i << 16);
     double u[3];
     for (int k = 0; k < 3; k++) {
-        u[k] = job->shift[k] + (double)(i + 1) * steps[k];
+        u[k] = job->shift[k] + (double)(i + 1) * steps[k] + JITTER * random_unit(&random);
         u[k] -= floor(u[k]);
     }
     bool is_distant = u[0] < job->distant_share;
