@@ -123,6 +123,44 @@ static void test_interactive_is_near_the_reference(void **state)
     }
 }
 
+/* A lamp of 2 degrees across. */
+static void paint_lamp(void *context, const double dir[static 3], float out_rgb[static 3])
+{
+    (void)context;
+    bool is_lamp = -0.64 * dir[0] + 0.48 * dir[1] + 0.6 * dir[2] > cos(M_PI / 180);
+    out_rgb[0] = out_rgb[1] = out_rgb[2] = is_lamp ? 1000 : 0.1f;
+}
+
+/** A few directions see a small lamp in every pixel alike, since each stands for its share of the
+ * lobe; as points they would hit it now and then. */
+static void test_a_small_lamp_does_not_sparkle(void **state)
+{
+    (void)state;
+    const struct gn_render_options options = {.single_ray = true};
+    const double eye[3] = {3, -1, 2};
+    enum { SIDE = 32 };
+    struct gn_test_stage stage = {0};
+    add_ball(&stage, gn_test_make_plane(20, 4), GN_MATERIAL_GGX, white, 0.6f, 1);
+    gn_test_stage_commit(&stage, 0);
+    gn_test_stage_set_map(&stage, 512, 256, paint_lamp, NULL);
+    gn_test_stage_set_lights_from_map(&stage, 8);
+    gn_test_stage_aim(&stage, SIDE, SIDE, 2000, eye, origin);
+    gn_test_stage_render(&stage, &options);
+    double sum = 0, squares = 0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double value = stage.layers.virtual_rgba.data[4 * i];
+        sum += value / (SIDE * SIDE);
+        squares += value * value / (SIDE * SIDE);
+    }
+    assert_true(sqrt(squares - sum * sum) < 0.7 * sum); // as points 12 times
+    const struct gn_render_options exact = {
+        .quality = GN_QUALITY_REFERENCE, .single_ray = true, .paths_per_pixel = 32};
+    gn_test_stage_render(&stage, &exact);
+    double share = sum / get_mean(&stage); // its highlight is wider, and dimmer at the top
+    assert_true(share > 0.5 && share < 1.1);
+    gn_test_stage_finish(&stage);
+}
+
 static void test_glass_bends(void **state)
 {
     (void)state;
@@ -254,6 +292,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_white_ball_vanishes_in_even_light),
         cmocka_unit_test(test_interactive_is_near_the_reference),
+        cmocka_unit_test(test_a_small_lamp_does_not_sparkle),
         cmocka_unit_test(test_glass_bends),
         cmocka_unit_test(test_without_gloss_nothing_of_it_runs),
         cmocka_unit_test(test_gloss_needs_the_pyramid),
