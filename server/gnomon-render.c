@@ -3,6 +3,7 @@
 /*
  * gnomon-render: one frame from files to files, without any server.
  */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -16,6 +17,7 @@ struct run {
     struct gn_render_needs needs;
     struct gn_lighting_state *light;
     struct gn_renderer *renderer;
+    struct gn_progressive *progressive; // NULL: the layers below
     struct gn_camera camera;
     struct gn_cli_background background;
     struct gn_layers layers;
@@ -51,11 +53,65 @@ static int read_inputs(const struct gn_cli_request *request, struct run *run,
     return ret;
 }
 
+/** How far the refinement is, now and then; at the end. */
+static void tell_progress(const struct gn_progressive_figures *f, int64_t *last_ns)
+{
+    int64_t now_ns = gn_clock_get_monotonic_ns();
+    if (f->error < 0 || f->n_passes % GN_PROGRESSIVE_ROUND != 0 ||
+        (!f->why_done && now_ns - *last_ns < GN_NS_PER_S))
+        return;
+    *last_ns = now_ns;
+    fprintf(stderr, "gnomon-render: %d passes, off by %.2g (shadow %.2g, radiance %.2g)%s%s\n",
+            f->n_passes, f->error, f->error_shadow, f->error_radiance, f->why_done ? ": " : "",
+            f->why_done ? f->why_done : "");
+}
+
+/** The times and rays of one more pass. */
+static void add_pass(struct gn_render_report *sum, const struct gn_render_report *pass)
+{
+    sum->ms_plan += pass->ms_plan;
+    sum->ms_primary += pass->ms_primary;
+    sum->ms_shade += pass->ms_shade;
+    sum->ms_shadow += pass->ms_shadow;
+    sum->ms_total += pass->ms_total;
+    sum->rays_primary += pass->rays_primary;
+    sum->rays_mirror += pass->rays_mirror;
+    sum->rays_shade += pass->rays_shade;
+    sum->rays_shadow += pass->rays_shadow;
+}
+
+static int refine(const struct gn_cli_request *request, struct run *run, struct gn_error *out_error)
+{
+    const char *obstacle = gn_progressive_get_obstacle(run->scene, &run->camera, &request->render);
+    if (obstacle)
+        return gn_error_set(out_error, -EINVAL, "--refine: %s", obstacle);
+    int ret = gn_progressive_create(run->renderer, run->pool, &run->progressive, out_error);
+    if (ret == 0)
+        ret = gn_progressive_begin(run->progressive, &run->camera, run->light, &request->render,
+                                   &request->refine, &run->report, out_error);
+    int64_t last_ns = gn_clock_get_monotonic_ns();
+    while (ret == 0 && !gn_progressive_get_figures(run->progressive)->why_done) {
+        struct gn_render_report pass;
+        ret = gn_progressive_add_pass(run->progressive, &pass, out_error);
+        if (ret < 0)
+            return ret;
+        add_pass(&run->report, &pass);
+        tell_progress(gn_progressive_get_figures(run->progressive), &last_ns);
+    }
+    if (ret < 0)
+        return ret;
+    run->report.estimated_error = gn_progressive_get_figures(run->progressive)->error_shadow;
+    gn_progressive_add_plan(&run->report, true, "asked for");
+    return 0;
+}
+
 static int render(const struct gn_cli_request *request, struct run *run, struct gn_error *out_error)
 {
     int ret = gn_renderer_create(run->scene, run->pool, &run->renderer, out_error);
     if (ret < 0)
         return ret;
+    if (request->refine.error > 0)
+        return refine(request, run, out_error);
     if ((ret = gn_layers_init(&run->layers, run->camera.width, run->camera.height)) < 0)
         return gn_error_set(out_error, ret, "no memory for layers of %d x %d pixels",
                             run->camera.width, run->camera.height);
@@ -93,10 +149,11 @@ static int run_request(const struct gn_cli_request *request, struct gn_error *ou
         .scene = run.scene,
         .light = run.light,
         .needs = &run.needs,
-        .layers = &run.layers,
+        .layers = run.progressive ? gn_progressive_get_layers(run.progressive) : &run.layers,
         .background = request->background ? &run.background : NULL,
         .report = &run.report,
         .budget = request->budget_ms > 0 ? &run.budget : NULL,
+        .refined = run.progressive ? gn_progressive_get_figures(run.progressive) : NULL,
         .n_threads = gn_pool_get_size(run.pool),
         .seed = request->render.seed,
         .ms_scene = run.ms_scene,
@@ -107,6 +164,7 @@ static int run_request(const struct gn_cli_request *request, struct gn_error *ou
 out:
     gn_layers_finish(&run.layers);
     gn_cli_background_finish(&run.background);
+    gn_progressive_destroy(&run.progressive);
     gn_renderer_destroy(&run.renderer);
     gn_lighting_state_unref(&run.light);
     gn_scene_destroy(&run.scene);

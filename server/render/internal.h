@@ -379,9 +379,10 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
 
 /* primary.c */
 
-/** Fills table[h][w][3] and slopes; see struct frame. pass: NULL, or whose points of the pixels. */
+/** Fills table[h][w][3] and slopes[4] (may be NULL); see struct frame. pass: NULL, or whose points
+ * of the pixels. */
 void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
-                          struct gn_pool *pool, float *table, double out_slopes[static 4]);
+                          struct gn_pool *pool, float *table, double *out_slopes);
 /** Aims rays through the centres of a block's pixels, the first of which is (x, y). */
 void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight *out);
 /** Fills the hits. */

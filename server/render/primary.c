@@ -74,11 +74,12 @@ static void bound_slopes(const struct gn_camera *camera, const float *table, dou
 }
 
 void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
-                          struct gn_pool *pool, float *table, double out_slopes[static 4])
+                          struct gn_pool *pool, float *table, double *out_slopes)
 {
     struct rays_job job = {.camera = camera, .pass = pass, .table = table};
     gn_pool_run(pool, camera->height, make_row, &job);
-    bound_slopes(camera, table, out_slopes);
+    if (out_slopes)
+        bound_slopes(camera, table, out_slopes);
 }
 
 void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],

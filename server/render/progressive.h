@@ -59,10 +59,10 @@ const char *gn_progressive_get_obstacle(const struct gn_scene *scene,
                                         const struct gn_render_options *options);
 
 /**
- * Renders the interactive picture, from which the passes to come begin. Keeps a reference to light;
- * a scene that is changed in the renderer later needs another begin. Takes memory only where the
- * picture, or a map, is larger than before. Returns as gn_renderer_render does. The caller has
- * asked for obstacles.
+ * For a picture without an obstacle: renders the interactive one, from which the passes to come
+ * begin. Keeps a reference to light; a scene that is changed in the renderer later needs another
+ * begin. Takes memory only where the picture, or a map, is larger than before. Returns as
+ * gn_renderer_render does.
  */
 GN_MUST_USE int
 gn_progressive_begin(struct gn_progressive *progressive, const struct gn_camera *camera,

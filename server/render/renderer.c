@@ -39,6 +39,7 @@ struct gn_renderer {
     bool *plain; // [blocks], see struct frame
     struct tile_figures *figures;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
+    bool has_pass_rays;           // through other points than the centres
     double slopes[4];
     struct blockers blockers;
     struct box wide_blockers[MAX_BLOCKERS];
@@ -160,20 +161,25 @@ static int reserve_pixels(struct gn_renderer *renderer, int width, int height)
                                                                                         : -ENOMEM;
 }
 
-/** The table of rays depends on the intrinsics only. */
+static bool has_same_rays(const struct gn_camera *a, const struct gn_camera *b)
+{
+    return a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
+           a->cx == b->cx && a->cy == b->cy &&
+           memcmp(a->distortion, b->distortion, sizeof(a->distortion)) == 0;
+}
+
+/** The table of rays depends on the intrinsics only, and on the pass. The slopes' bounds hold for
+ * all points of the pixels. */
 static void update_rays(struct gn_renderer *renderer, const struct gn_camera *camera,
                         const struct pass *pass)
 {
-    const struct gn_camera *old = &renderer->rays_camera;
-    if (!pass && old->width == camera->width && old->height == camera->height &&
-        old->fx == camera->fx && old->fy == camera->fy && old->cx == camera->cx &&
-        old->cy == camera->cy &&
-        memcmp(old->distortion, camera->distortion, sizeof(old->distortion)) == 0)
-        return;
-    gn_primary_make_rays(camera, pass, renderer->pool, renderer->rays, renderer->slopes);
+    bool is_same = has_same_rays(&renderer->rays_camera, camera);
+    if (pass && is_same)
+        gn_primary_make_rays(camera, pass, renderer->pool, renderer->rays, NULL);
+    else if (!is_same || renderer->has_pass_rays)
+        gn_primary_make_rays(camera, pass, renderer->pool, renderer->rays, renderer->slopes);
     renderer->rays_camera = *camera;
-    if (pass)
-        renderer->rays_camera.fx = 0; // no camera's centres
+    renderer->has_pass_rays = pass != NULL;
 }
 
 static int reserve_texels(struct gn_renderer *renderer)

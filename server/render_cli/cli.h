@@ -17,6 +17,7 @@
 #include "proto/attr.h"
 #include "server/light/state.h"
 #include "server/render/budget.h"
+#include "server/render/progressive.h"
 #include "server/render/render.h"
 #include "server/scene/scene.h"
 
@@ -36,11 +37,12 @@ struct gn_cli_request {
     double world_from_env[4]; // quaternion w, x, y, z
     struct gn_light_options light;
     struct gn_render_options render;
-    int n_emitter_pieces; // 0: the default
-    const char *emission; // NAME=FILE; may be NULL
-    double budget_ms;     // 0: none
-    int n_threads;        // 0: one per processor
-    unsigned match;       // of enum gn_match_part
+    struct gn_progressive_options refine; // error 0: one ordinary picture
+    int n_emitter_pieces;                 // 0: the default
+    const char *emission;                 // NAME=FILE; may be NULL
+    double budget_ms;                     // 0: none
+    int n_threads;                        // 0: one per processor
+    unsigned match;                       // of enum gn_match_part
 };
 
 /**
@@ -118,6 +120,7 @@ struct gn_cli_result {
     const struct gn_layers *layers;
     const struct gn_cli_background *background; // NULL: none
     const struct gn_render_report *report;
+    const struct gn_progressive_figures *refined; // NULL: it was not
     const struct gn_render_needs *needs;
     const struct gn_cli_budget *budget; // NULL: none
     int n_threads;

@@ -102,6 +102,10 @@ static void read_numbers(struct gn_cli_request *request)
         request->light.method = (enum gn_light_method)get_enum(request, "light-method");
     if (is_set(request, "lights"))
         request->light.n_lights = get_int(request, "lights");
+    if (is_set(request, "refine"))
+        request->refine.error = gn_options_get_double(request->options, NULL, NULL, "refine");
+    if (is_set(request, "passes"))
+        request->refine.max_passes = get_int(request, "passes");
     render->shadow_unweighted = !get_bool(request, "shadow-cosine");
     render->shadow_ignore_real = !get_bool(request, "shadow-real-blockers");
     request->has_projection = is_set(request, "env-projection");
@@ -125,6 +129,12 @@ static int check_together(const struct gn_cli_request *request, struct gn_error 
         return gn_error_set(out_error, -EINVAL, "--%s is for --quality reference, not for %s",
                             request->render.bounces > 0 ? "bounces" : "paths",
                             gn_cli_get_quality_name(request->render.quality));
+    if (request->refine.max_passes > 0 && request->refine.error == 0)
+        return gn_error_set(out_error, -EINVAL,
+                            "--passes: they are of --refine ERROR, which is not given");
+    if (request->refine.error > 0 && request->budget_ms > 0)
+        return gn_error_set(out_error, -EINVAL,
+                            "--refine and --budget-ms: one ends by error, the other by time");
     if (request->composite_png && !request->background)
         return gn_error_set(out_error, -EINVAL,
                             "--composite-png: there is no composite without --background");

@@ -56,6 +56,20 @@ static const struct gn_option table[] = {
      .default_value = "interactive",
      .help = "interactive: lights found in the map. seed: the 2007 paper to the letter. reference: "
              "every texel with exact visibility; slow, the judge of the others."},
+    {.key = "refine",
+     .type = GN_OPTION_DOUBLE,
+     .min = 1e-6,
+     .max = 1,
+     .value_name = "ERROR",
+     .help = "Adds passes to the interactive picture, which then tends to the reference's without "
+             "bounces and caustics, until it is off by no more: the shadow factor, and virtual "
+             "radiance as a share of its mean. Progress goes to stderr."},
+    {.key = "passes",
+     .type = GN_OPTION_INT,
+     .min = GN_PROGRESSIVE_ROUND,
+     .max = GN_PROGRESSIVE_PASSES_MAX,
+     .value_name = "N",
+     .help = "Most passes of --refine; without it 1024."},
     {.key = "shading",
      .type = GN_OPTION_ENUM,
      .choices = SHADINGS,

@@ -110,15 +110,22 @@ static json_t *make_budget(const struct gn_cli_request *request, const struct gn
         "switches", (json_int_t)budget->n_switches);
 }
 
+static json_t *make_refined(const struct gn_progressive_figures *f)
+{
+    if (!f)
+        return json_null();
+    return json_pack("{s:i, s:f, s:f, s:f}", "passes", f->n_passes, "error", f->error,
+                     "error_shadow", f->error_shadow, "error_radiance", f->error_radiance);
+}
+
 /** NULL where memory runs out. */
 static json_t *make_report(const struct gn_cli_request *request, const struct gn_cli_result *result)
 {
     const struct gn_render_report *r = result->report;
     const struct gn_scene *scene = result->scene;
     return json_pack(
-        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:o, s:I, "
-        "s:I, "
-        "s:I, s:{s:i, s:i, s:i}}",
+        "{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:i, s:o, s:o, s:o, "
+        "s:I, s:I, s:I, s:{s:i, s:i, s:i}}",
         "version", GN_VERSION, "quality", gn_cli_get_quality_name(request->render.quality),
         "bounces", request->render.bounces, "width", result->camera->width, "height",
         result->camera->height, "threads", result->n_threads, "light_method",
@@ -126,10 +133,11 @@ static json_t *make_report(const struct gn_cli_request *request, const struct gn
         make_timings(result), "rays", make_rays(r), "environment", make_map(result->light->map),
         "sh", make_sh(result->light), "light_left_out", make_left_out(result), "lights",
         r->n_lights, "estimated_error", make_number(r->estimated_error), "budget",
-        make_budget(request, result->budget), "virtual_pixels", (json_int_t)r->n_virtual_pixels,
-        "shadow_pixels", (json_int_t)r->n_shadow_pixels, "refined_pixels",
-        (json_int_t)r->n_refined_pixels, "scene", "objects", scene->n_objects, "real_triangles",
-        scene->n_real_triangles, "virtual_triangles", scene->n_virtual_triangles);
+        make_budget(request, result->budget), "refined", make_refined(result->refined),
+        "virtual_pixels", (json_int_t)r->n_virtual_pixels, "shadow_pixels",
+        (json_int_t)r->n_shadow_pixels, "refined_pixels", (json_int_t)r->n_refined_pixels, "scene",
+        "objects", scene->n_objects, "real_triangles", scene->n_real_triangles, "virtual_triangles",
+        scene->n_virtual_triangles);
 }
 
 int gn_cli_write_report(const struct gn_cli_request *request, const struct gn_cli_result *result,

@@ -187,6 +187,36 @@ def test_threads_give_the_same_bits():
         check(one.read() == three.read(), 'the layers differ')
 
 
+def test_refining():
+    """More passes bring the shadow nearer to the reference's, as near as they say."""
+    def rms(name, wanted):
+        pairs = [(a, b) for channel in ('shadow.R', 'shadow.G', 'shadow.B')
+                 for a, b in zip(read_exr(name)[0][channel], wanted[channel]) if b < 1]
+        return math.sqrt(sum((a - b) ** 2 for a, b in pairs) / len(pairs))
+
+    check_run('--quality', 'reference', out='reference.exr')
+    check_run('--lights', '16', out='coarse.exr')
+    done = run('--refine', '1e-6', '--passes', '130', '--lights', '16', '--report', 'report.json',
+               out='fine.exr')
+    lines = done.stderr.decode().splitlines()
+    check(done.returncode == 0 and 'gnomon-render: 128 passes, off by ' in lines[-1] and
+          lines[-1].endswith(': all passes are done'), lines)
+    with open('report.json') as file:
+        report = json.load(file)
+    refined = report['refined']
+    check(refined['passes'] == 128 and refined['error'] >= refined['error_shadow'] > 0, refined)
+    check(report['plan'][-1] == {'pass': 'progressive', 'ran': True, 'why': 'asked for'}, report)
+    reference = read_exr('reference.exr')[0]
+    coarse, fine = rms('coarse.exr', reference), rms('fine.exr', reference)
+    print('# shadow off by %.4f, after 128 passes by %.4f, says %.4f' % (
+        coarse, fine, refined['error_shadow']))
+    check(fine < 0.2 * coarse and fine < 3 * refined['error_shadow'], 'not refined')
+    done = run('--refine', '0.05', '--report', 'report.json')
+    with open('report.json') as file:
+        refined = json.load(file)['refined']
+    check(done.returncode == 0 and refined['error'] <= 0.05 and refined['passes'] < 200, refined)
+
+
 def test_qualities_and_methods_run():
     for options in (['--quality', 'seed'], ['--quality', 'seed', '--shading', 'irradiance'],
                     ['--light-method', 'penrose', '--lights', '16'],
@@ -338,6 +368,11 @@ def list_bad():
     yield 'an input and an output', ['--report', 'camera.json'], {}
     yield '--budget-ms', ['--budget-ms', '0'], {}
     yield 'is for --quality interactive', ['--budget-ms', '20', '--quality', 'seed'], {}
+    yield '--refine ERROR', ['--passes', '20'], {}
+    yield 'passes', ['--refine', '0.1', '--passes', '3'], {}
+    yield 'refine', ['--refine', '0'], {}
+    yield '--budget-ms: one', ['--refine', '0.1', '--budget-ms', '20'], {}
+    yield '--refine: reference quality', ['--refine', '0.1', '--quality', 'reference'], {}
     yield '--no-such', ['--no-such', '3'], {}
     yield 'quality', ['--quality', 'best'], {}
     yield 'lights', ['--lights', '0'], {}
