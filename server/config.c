@@ -67,6 +67,7 @@ int gn_config_get_room(const struct gn_options *options, int i, char out_scene_p
         .encoded_multiply = gn_options_get_enum(o, "room", room, "composite") == 1,
         .unmatched = GN_MATCH_ALL & ~gn_options_get_set(o, "room", room, "match"),
         .refuse_reference = !gn_options_get_bool(o, "room", room, "allow-reference"),
+        .no_refining = !gn_options_get_bool(o, "room", room, "refine"),
         .max_picture_width = gn_options_get_int(o, "room", room, "max-picture-width"),
         .max_picture_height = gn_options_get_int(o, "room", room, "max-picture-height"),
         .max_environment_width = gn_options_get_int(o, "room", room, "max-environment-width"),

@@ -146,10 +146,16 @@ static json_t *make_receipt(const struct gn_msg_receipt *r)
                   (json_int_t)r->rays_shadow, "secondary", (json_int_t)r->rays_secondary);
     // A negative estimate means that there is none.
     json_t *error = r->estimated_error >= 0 ? json_real((double)r->estimated_error) : json_null();
-    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o, s:o}", "stages_ms", stages,
+    json_t *refined = json_null();
+    if (r->refined_passes > 0)
+        refined =
+            json_pack("{s:I, s:o}", "passes", (json_int_t)r->refined_passes, "error",
+                      r->refined_error >= 0 ? json_real((double)r->refined_error) : json_null());
+    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o, s:o, s:o}", "stages_ms", stages,
                      "lighting_sequence", (json_int_t)r->lighting_sequence, "lighting_age_ms",
                      (double)r->lighting_age_ms, "lights", (int)r->lights_used, "rays", rays,
-                     "left_out", left_out, "estimated_error", error, "budget", make_budget(r));
+                     "left_out", left_out, "estimated_error", error, "budget", make_budget(r),
+                     "refined", refined);
 }
 
 /** Appends one frame to view.json; takes it. */

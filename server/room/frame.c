@@ -4,15 +4,20 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/clock.h"
 #include "common/composite.h"
 #include "common/jpeg.h"
+#include "common/log.h"
 #include "server/room/buf_pool.h"
 #include "server/room/pace.h"
+#include "server/room/still.h"
 #include "server/scene/motion.h"
+
+GN_LOG_TOPIC("room");
 
 /** The buffers of one picture size. */
 struct frame_buffers {
@@ -26,6 +31,7 @@ struct frame_buffers {
 struct gn_frame_maker {
     const struct gn_room_options *options;
     struct gn_renderer *renderer;
+    struct gn_still *still;
     struct gn_compositor *compositor;
     struct gn_motion *motion;
     struct gn_scene_snapshot *snapshot; // a reference: what the renderer shows; NULL: the scene
@@ -53,6 +59,8 @@ int gn_frame_maker_create(const struct gn_room_options *options, const struct gn
         return gn_error_set(out_error, -ENOMEM, "out of memory");
     m->options = options;
     int rc = gn_renderer_create(scene, options->pool, &m->renderer, out_error);
+    if (rc == 0)
+        rc = gn_still_create(scene, options->pool, &m->still, out_error);
     if (rc == 0)
         rc = gn_motion_create(scene, &m->motion, out_error);
     if (rc < 0)
@@ -83,6 +91,7 @@ void gn_frame_maker_destroy(struct gn_frame_maker **maker)
     gn_buf_pool_destroy(&m->payloads);
     gn_jpeg_destroy(&m->jpeg);
     gn_compositor_destroy(&m->compositor);
+    gn_still_destroy(&m->still);
     gn_renderer_destroy(&m->renderer);
     gn_scene_snapshot_unref(&m->snapshot);
     gn_motion_destroy(&m->motion);
@@ -98,6 +107,7 @@ int gn_frame_maker_pose(struct gn_frame_maker *maker, const struct gn_pose *pose
     if (rc < 0)
         return rc;
     gn_renderer_set_scene(maker->renderer, gn_scene_snapshot_get(snapshot));
+    gn_still_set_scene(maker->still, gn_scene_snapshot_get(snapshot));
     gn_scene_snapshot_unref(&maker->snapshot);
     maker->snapshot = snapshot;
     return 0;
@@ -204,15 +214,83 @@ static void add_report(struct gn_msg_receipt *receipt, const struct gn_render_re
 struct work {
     struct gn_frame_maker *maker;
     struct gn_frame_job *job;
-    const struct gn_lighting_state *light;
+    struct gn_lighting_state *light;
     struct gn_msg_result *result;      // being filled, in the job's answer's place
     struct gn_buf *payload;            // being filled
     size_t used;                       // bytes of it
     struct gn_pace_turn turn;          // of the viewer
+    bool is_refined;                   // a view of it
     const struct gn_image8 *composite; // of the view made last
 };
 
-/** Renders a view and puts it over b->background, into b->composite. */
+static void tell_step(void *context, const struct gn_render_report *report)
+{
+    add_report(context, report);
+}
+
+/** The layers of a view that has held still since its last frame. False: it has not, or this
+ * failed. Else what is to be told of the frame, *out_why, and the slot that wants to know of it. */
+static bool refine_view(struct work *w, const struct gn_still_view *view, int *out_slot,
+                        const char **out_why, const struct gn_layers **out_layers)
+{
+    static struct gn_log_limiter limiter = {.burst = 5, .interval_ns = 10 * GN_NS_PER_S};
+    struct gn_still *still = w->maker->still;
+    struct gn_msg_receipt *receipt = &w->result->receipt;
+    struct gn_still_picture picture;
+    struct gn_error error = {0};
+    *out_slot = -1;
+    *out_why = w->maker->options->no_refining ? "switched off for the room"
+                                              : gn_still_look(still, view, out_slot);
+    if (*out_why)
+        return false;
+    if (gn_still_refine(still, *out_slot, tell_step, receipt, &picture, &error) < 0) {
+        gn_log_limited(&limiter, GN_LOG_WARN, "a still view is not refined: %s", error.text);
+        *out_why = "refining failed";
+        return false;
+    }
+    *out_layers = picture.layers;
+    w->is_refined = true;
+    receipt->refined_passes = (uint32_t)picture.figures.n_passes;
+    if (picture.figures.error >= 0) {
+        receipt->refined_error = fmaxf(receipt->refined_error, (float)picture.figures.error);
+        receipt->estimated_error =
+            fmaxf(receipt->estimated_error, (float)picture.figures.error_shadow);
+    }
+    return true;
+}
+
+/** The layers of a view, refined or rendered into b->layers. */
+static int make_layers(struct work *w, size_t index, const struct gn_render_options *options,
+                       struct frame_buffers *b, const struct gn_layers **out_layers,
+                       struct gn_error *error)
+{
+    struct gn_frame_maker *m = w->maker;
+    const struct gn_camera *camera = &w->job->cameras[index];
+    const struct gn_still_view view = {
+        .session_id = w->job->answer->session_id,
+        .index = index,
+        .camera = camera,
+        .light = w->light,
+        .options = options,
+        .now_ns = gn_clock_get_monotonic_ns(),
+    };
+    struct gn_render_report report = {0};
+    int slot;
+    const char *why;
+    if (refine_view(w, &view, &slot, &why, out_layers))
+        return 0;
+    int rc = gn_renderer_render(m->renderer, camera, w->light, options, &b->layers, &report, error);
+    if (rc < 0)
+        return rc;
+    gn_still_note(m->still, slot, &report);
+    gn_pace_put_report(&w->turn, (int)index, &report);
+    gn_progressive_add_plan(&report, false, why);
+    add_report(&w->result->receipt, &report);
+    *out_layers = &b->layers;
+    return 0;
+}
+
+/** Makes a view's layers and puts them over b->background, into b->composite. */
 static int draw_view(struct work *w, size_t index, struct frame_buffers *b, struct gn_error *error)
 {
     struct gn_frame_maker *m = w->maker;
@@ -221,15 +299,11 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     options.quality = (enum gn_quality)w->job->frame.quality;
     options.seed = w->job->frame.id;
     gn_pace_set_options(&w->turn, &options);
-    struct gn_render_report report = {0};
-    int rc =
-        gn_renderer_render(m->renderer, camera, w->light, &options, &b->layers, &report, error);
+    const struct gn_layers *made;
+    int rc = make_layers(w, index, &options, b, &made, error);
     if (rc < 0)
         return rc;
-    add_report(&w->result->receipt, &report);
-    gn_pace_put_report(&w->turn, (int)index, &report);
-    const struct gn_composite_layers layers = {&b->layers.virtual_rgba, &b->layers.shadow,
-                                               &b->layers.added};
+    const struct gn_composite_layers layers = {&made->virtual_rgba, &made->shadow, &made->added};
     const struct gn_composite_options look = {
         .encoded_multiply = m->options->encoded_multiply || options.quality == GN_QUALITY_SEED,
         .match = camera->match,
@@ -326,12 +400,12 @@ static void start_receipt(struct gn_msg_receipt *receipt, const struct gn_frame_
     receipt->lighting_age_ms =
         (float)gn_clock_get_ms_between(light->capture_time_ns, job->frame.capture_time_ns);
     receipt->estimated_error = -1;
+    receipt->refined_error = -1;
     receipt->quality = job->frame.quality;
 }
 
 void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
-                         const struct gn_lighting_state *light,
-                         struct gn_frame_outcome *out_outcome)
+                         struct gn_lighting_state *light, struct gn_frame_outcome *out_outcome)
 {
     int64_t start_ns = gn_clock_get_monotonic_ns();
     *out_outcome = (struct gn_frame_outcome){0};
@@ -363,7 +437,9 @@ void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
     for (size_t i = 0; i < job->frame.views_count; i++)
         pixels += (double)job->cameras[i].width * job->cameras[i].height;
     out_outcome->busy_ms = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
-    gn_pace_end(&w.turn, job, out_outcome->busy_ms, &w.result->receipt);
+    if (!w.is_refined)
+        gn_pace_end(&w.turn, job, out_outcome->busy_ms, &w.result->receipt);
     out_outcome->vga_ms = out_outcome->busy_ms * (640.0 * 480.0 / pixels);
+    out_outcome->is_refined = w.is_refined;
     out_outcome->composite = w.composite;
 }

@@ -25,6 +25,7 @@ struct gn_frame_outcome {
     double busy_ms;
     double vga_ms;                     // busy_ms scaled by pixels to 640 x 480
     int wanted_lights;                 // that the viewers' budgets leave room for; 0: all
+    bool is_refined;                   // a view held still: its times say nothing of others
     const struct gn_image8 *composite; // of the last view; the maker's until the next frame
     struct gn_error error;             // where there is a reason
 };
@@ -49,7 +50,6 @@ GN_MUST_USE int gn_frame_maker_pose(struct gn_frame_maker *maker, const struct g
  * *out_outcome the answer is untouched. Takes memory only where a size is new.
  */
 void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
-                         const struct gn_lighting_state *light,
-                         struct gn_frame_outcome *out_outcome);
+                         struct gn_lighting_state *light, struct gn_frame_outcome *out_outcome);
 
 #endif

@@ -115,7 +115,7 @@ static void count_result(struct gn_room *room, const struct turn *turn,
     f->frames_out++;
     gn_time_histogram_add(&f->busy, outcome->busy_ms);
     gn_time_window_add(&room->busy_ms, outcome->busy_ms);
-    if (job->frame.quality != GN_MSG_QUALITY_REFERENCE)
+    if (job->frame.quality != GN_MSG_QUALITY_REFERENCE && !outcome->is_refined)
         gn_time_window_add(&room->vga_ms, outcome->vga_ms);
     if (!job->has_waited) { // for light: that is not a slow frame
         gn_time_histogram_add(&f->latency, latency_ms);

@@ -37,6 +37,7 @@ struct gn_room_options {
     bool encoded_multiply;           // the paper's composite: the factor scales codes
     unsigned unmatched;              // of enum gn_match_part: what of the cameras is not matched
     bool refuse_reference;           // frames of reference quality are dropped
+    bool no_refining;                // views that hold still are rendered like any
     int max_picture_width, max_picture_height;         // px, [1, GN_LIMIT_SIDE_PX]
     int max_environment_width, max_environment_height; // px, [1, GN_LIMIT_SIDE_PX]
     double holdable_margin;     // share of the measured rate that is promised, (0, 1]

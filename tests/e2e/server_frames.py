@@ -54,7 +54,7 @@ def test_budget():
                    for _ in range(n)]
         return [r.receipt for r in results]
 
-    with Daemon('budget-ms = 0.001') as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
+    with Daemon('budget-ms = 0.001\nrefine = false') as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
         light_up(light)
         receipts = watch(viewer, 20, budget_ms=50)  # the shorter one counts
         assert all(abs(r.budget.budget_ms - 0.001) < 1e-9 for r in receipts), receipts[0].budget
@@ -69,7 +69,8 @@ def test_budget():
         assert room['budget']['frames'] == room['budget']['misses'] == 20, room['budget']
         assert room['last_receipt']['budget'] is None
         assert b'gnomon_budget_misses_total{room="demo"} 20' in daemon.get('/metrics')[1]
-    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 64, 48) as viewer:
+    with Daemon('refine = false') as daemon, probe(daemon) as light, \
+            Viewer(daemon, 64, 48) as viewer:
         light_up(light)
         assert not watch(viewer, 1)[0].HasField('budget')
         receipts = watch(viewer, 40, budget_ms=60000)
@@ -80,6 +81,67 @@ def test_budget():
         assert receipts[-1].estimated_error > 0 and last.predicted_error > 0, receipts[-1]
         status = json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['last_receipt']['budget']
         assert status['verdict'] == 'fits' and status['setting']['lights'] == 64, status
+
+
+def why_not_refined(receipt):
+    return [line.why for line in getattr(receipt, 'left_out') if getattr(line, 'pass') == 'progressive']
+
+
+def test_a_still_view_is_refined():
+    """While nothing changes a picture gets better, says how good it is, and in the end costs nothing."""
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
+        def see(**fields):
+            result, payload = viewer.expect_result(viewer.send_frame(**fields))
+            return result.receipt, payload
+
+        light_up(light, 1)
+        receipt, first = see(lighting_min_sequence=1, lighting_wait_ms=60000)
+        assert receipt.refined_passes == 0 and receipt.refined_error < 0, receipt
+        assert why_not_refined(receipt) == ["the view's first frame"], receipt
+        passes, errors = [], []
+        while receipt.rays_primary > 0:
+            receipt, payload = see()
+            passes.append(receipt.refined_passes)
+            errors.append(receipt.refined_error)
+            # The camera's picture is each frame's own, what is put over it hardly changes.
+            off = max(abs(a - b) for a, b in zip(payload, first))
+            assert off <= 24, 'a pop of %d codes after %d passes' % (off, passes[-1])
+            assert len(passes) < 1100, 'never done'
+        print('# %d frames, %d passes, error %.4f' % (len(passes), passes[-1], errors[-1]))
+        assert passes[0] == 0 and passes == sorted(passes) and passes[-1] >= 16
+        known = [e for e in errors if e >= 0]
+        assert errors[0] < 0 and 0 <= known[-1] < 0.5 * known[0]
+        assert known[-1] <= 1e-3 or passes[-1] == 1024
+        assert receipt.rays_shadow == 0 and receipt.lighting_sequence == 1
+        assert len(why_not_refined(receipt)) == 1
+        status = json.loads(daemon.get('/api/v1/status')[1])
+        assert status['rooms'][0]['last_receipt']['refined']['passes'] == passes[-1]
+
+        dark, _ = see(picture=bytes(len(viewer.picture)))
+        assert dark.refined_passes == passes[-1], 'another picture is no change'
+        light_up(light, 2)  # the same light at a later time
+        receipt, _ = see(lighting_min_sequence=2, lighting_wait_ms=60000)
+        assert receipt.refined_passes == passes[-1] and receipt.lighting_sequence == 2
+        moved = pb.Transform(orientation=[0, 1, 0, 0], position_m=[0, 0, 1.001])
+        receipt, _ = see(pose=moved)
+        assert receipt.refined_passes == 0 and receipt.rays_primary > 0
+        assert why_not_refined(receipt) == ['the camera has moved since the last frame']
+        see(pose=moved)
+        light_up(light, 3, pixels=struct.pack('<f', 0.5) * (3 * 32 * 16))
+        receipt, _ = see(pose=moved, lighting_min_sequence=3, lighting_wait_ms=60000)
+        assert receipt.refined_passes == 0
+        assert why_not_refined(receipt) == ['the light has changed since the last frame']
+        receipt, _ = see(pose=moved, quality=pb.QUALITY_SEED)
+        assert why_not_refined(receipt) == ["seed quality is the paper's picture, not a step to "
+                                            "another"]
+    with Daemon('refine = false') as daemon, probe(daemon) as light, \
+            Viewer(daemon) as viewer:
+        light_up(light, 1)
+        for _ in range(12):
+            result, _ = viewer.expect_result(viewer.send_frame(lighting_min_sequence=1,
+                                                               lighting_wait_ms=60000))
+            assert result.receipt.refined_passes == 0 and result.receipt.rays_primary > 0
+            assert why_not_refined(result.receipt) == ['switched off for the room']
 
 
 def test_each_id_once():
@@ -371,7 +433,8 @@ def test_shutdown():
         assert time.monotonic() - start < 15
 
 
-run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_budget, test_each_id_once,
+run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_budget,
+           test_a_still_view_is_refined, test_each_id_once,
            test_one_outstanding_loses_nothing,
            test_slow_reader, test_told_at_once, test_discs_are_told, test_waiting_for_light, test_reasons,
            test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,
