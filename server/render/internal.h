@@ -490,7 +490,7 @@ void gn_receivers_sum(const struct frame *frame, const struct receivers *receive
 void gn_occlusion_clear(const struct frame *frame, struct scratch *scratch);
 /** Marks in cut what virtual objects hide, of the lights that scratch lists. */
 void gn_occlusion_find_cut(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
-/** Marks in hidden what real objects hide from the wanted receivers; not where it is marked. */
+/** Marks in hidden what real objects hide from the wanted receivers. */
 void gn_occlusion_find_hidden(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
 /** Marks in hidden what any object hides from all receivers. */
 void gn_occlusion_find_all(const struct frame *frame, struct scratch *scratch, uint64_t *rays);

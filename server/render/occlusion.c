@@ -176,27 +176,25 @@ static void list_flat(const struct frame *frame, const struct receivers *r, int 
     }
 }
 
-/** Which of a block's lanes do real objects hide from the light? Rays where neither the boxes of
- * the flat ones nor the silhouette of the others say. */
+/** Which of the lanes of a block that a light reaches do real objects hide from it? Rays where
+ * neither the boxes of the flat ones nor the silhouette of the others say. */
 static void hide_block(const struct frame *frame, struct scratch *scratch, int block, int light,
-                       uint64_t *rays)
+                       unsigned lanes, uint64_t *rays)
 {
     const struct receivers *r = &scratch->receivers;
-    const struct silhouette *s = &frame->real_silhouettes->of[light];
-    unsigned lanes = r->wanted[block];
     unsigned dark = 0;
     unsigned edge = 0;
     float dir[3];
     gn_render_lights_get_dir(frame->lights, light, dir);
-    if (gn_silhouette_get_box(s, &r->boxes[block]) != SILHOUETTE_FREE)
-        gn_silhouette_get_block(frame, s, r, block, &dark, &edge);
-    lanes &= dark | edge | get_meeting(frame, &scratch->high, &r->boxes[block], dir);
-    if (lanes == 0)
-        return;
-    lanes &= gn_receivers_get_lit(frame, r, block, dir) & ~(unsigned)scratch->hidden[block][light];
-    if ((lanes & dark) != 0 && is_before(frame, scratch, block, dir, 0)) {
-        scratch->hidden[block][light] |= (uint16_t)(lanes & dark);
-        lanes &= ~dark;
+    if (frame->real_silhouettes) {
+        const struct silhouette *s = &frame->real_silhouettes->of[light];
+        if (gn_silhouette_get_box(s, &r->boxes[block]) != SILHOUETTE_FREE)
+            gn_silhouette_get_block(frame, s, r, block, &dark, &edge);
+        lanes &= dark | edge | get_meeting(frame, &scratch->high, &r->boxes[block], dir);
+        if ((lanes & dark) != 0 && is_before(frame, scratch, block, dir, 0)) {
+            scratch->hidden[block][light] |= (uint16_t)(lanes & dark);
+            lanes &= ~dark;
+        }
     }
     gn_receivers_trace(frame, scratch, block, light, lanes, GN_RT_REAL, scratch->hidden, rays);
 }
@@ -214,20 +212,18 @@ void gn_occlusion_find_hidden(const struct frame *frame, struct scratch *scratch
         for (int l = 0; l < lights->n && r->wanted[b] != 0; l++) {
             float dir[3];
             gn_render_lights_get_dir(lights, l, dir);
-            if (frame->real_silhouettes)
-                hide_block(frame, scratch, b, l, rays);
-            else
-                gn_receivers_trace(frame, scratch, b, l,
-                                   gn_receivers_get_lit(frame, r, b, dir) & r->wanted[b] &
-                                       ~(unsigned)scratch->hidden[b][l],
-                                   GN_RT_REAL, scratch->hidden, rays);
+            unsigned lanes = gn_receivers_get_lit(frame, r, b, dir) & r->wanted[b];
+            if (lanes != 0)
+                hide_block(frame, scratch, b, l, lanes, rays);
         }
     }
     gn_receivers_flush(frame, scratch, GN_RT_REAL, scratch->hidden, rays);
 }
 
-/** Traces the lanes that the light reaches to the virtual objects. */
-static void trace_lit(const struct frame *frame, struct scratch *scratch, int block, uint64_t *rays)
+/** Marks in hidden what virtual objects hide from a block; lit: the lanes that each light reaches.
+ */
+static void find_self(const struct frame *frame, struct scratch *scratch, int block, uint16_t *lit,
+                      uint64_t *rays)
 {
     const struct light_list *lights = frame->lights;
     const struct receivers *r = &scratch->receivers;
@@ -237,26 +233,33 @@ static void trace_lit(const struct frame *frame, struct scratch *scratch, int bl
         float dir[3];
         gn_render_lights_get_dir(lights, l, dir);
         unsigned lanes = gn_receivers_get_lit(frame, r, block, dir);
+        lit[l] = (uint16_t)lanes;
         if (frame->cull && lanes != 0)
             lanes &= get_meeting(frame, &scratch->high, &r->boxes[block], dir);
-        gn_receivers_trace(frame, scratch, block, l, lanes, GN_RT_VIRTUAL, scratch->cut, rays);
+        gn_receivers_trace(frame, scratch, block, l, lanes, GN_RT_VIRTUAL, scratch->hidden, rays);
     }
+    gn_receivers_flush(frame, scratch, GN_RT_VIRTUAL, scratch->hidden, rays);
 }
 
 void gn_occlusion_find_all(const struct frame *frame, struct scratch *scratch, uint64_t *rays)
 {
     struct receivers *r = &scratch->receivers;
+    const struct box *boxes[MAX_BLOCKERS];
     gn_occlusion_clear(frame, scratch);
-    for (int b = 0; b < r->n_blocks; b++) {
-        trace_lit(frame, scratch, b, rays);
+    for (int b = 0; b < r->n_blocks; b++)
         r->wanted[b] = 0xffff;
-    }
-    gn_receivers_flush(frame, scratch, GN_RT_VIRTUAL, scratch->cut, rays);
+    int n_boxes = frame->real_silhouettes ? gn_blockers_list_above(frame, r, boxes) : 0;
+    scratch->low[0].block = -1;
     for (int b = 0; b < r->n_blocks; b++) {
-        size_t bytes = (size_t)frame->lights->n * sizeof(uint16_t);
-        memcpy(scratch->hidden[b], scratch->cut[b], bytes);
+        find_self(frame, scratch, b, scratch->mask, rays);
+        list_flat(frame, r, b, boxes, n_boxes, &scratch->high);
+        for (int l = 0; l < frame->lights->n; l++) {
+            unsigned lanes = scratch->mask[l] & ~(unsigned)scratch->hidden[b][l];
+            if (lanes != 0)
+                hide_block(frame, scratch, b, l, lanes, rays);
+        }
+        gn_receivers_flush(frame, scratch, GN_RT_REAL, scratch->hidden, rays);
     }
-    gn_occlusion_find_hidden(frame, scratch, rays);
 }
 
 void gn_occlusion_clear(const struct frame *frame, struct scratch *scratch)

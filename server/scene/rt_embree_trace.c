@@ -215,20 +215,18 @@ bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org
 /** The packet as Embree has it. */
 static void fill_rays(const struct gn_rt_packet *packet, struct RTCRay16 *ray)
 {
-    for (int i = 0; i < GN_RT_PACKET; i++) {
-        ray->org_x[i] = packet->org_x[i];
-        ray->org_y[i] = packet->org_y[i];
-        ray->org_z[i] = packet->org_z[i];
-        ray->tnear[i] = packet->t_near[i];
-        ray->dir_x[i] = packet->dir_x[i];
-        ray->dir_y[i] = packet->dir_y[i];
-        ray->dir_z[i] = packet->dir_z[i];
-        ray->time[i] = 0.0f;
-        ray->tfar[i] = packet->t_far[i];
-        ray->mask[i] = 0xffffffffu;
-        ray->id[i] = 0;
-        ray->flags[i] = 0;
-    }
+    memcpy(ray->org_x, packet->org_x, sizeof(ray->org_x));
+    memcpy(ray->org_y, packet->org_y, sizeof(ray->org_y));
+    memcpy(ray->org_z, packet->org_z, sizeof(ray->org_z));
+    memcpy(ray->tnear, packet->t_near, sizeof(ray->tnear));
+    memcpy(ray->dir_x, packet->dir_x, sizeof(ray->dir_x));
+    memcpy(ray->dir_y, packet->dir_y, sizeof(ray->dir_y));
+    memcpy(ray->dir_z, packet->dir_z, sizeof(ray->dir_z));
+    memcpy(ray->tfar, packet->t_far, sizeof(ray->tfar));
+    memset(ray->time, 0, sizeof(ray->time));
+    memset(ray->mask, 0xff, sizeof(ray->mask));
+    memset(ray->id, 0, sizeof(ray->id));
+    memset(ray->flags, 0, sizeof(ray->flags));
 }
 
 void gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
@@ -265,21 +263,55 @@ void gn_rt_get_hit(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits,
              hits->u[lane], hits->v[lane], out_hit);
 }
 
+/** True where all lanes that have met something have met the same triangle. */
+static bool is_one_triangle(const struct gn_rt_packet_hits *hits, int lane)
+{
+    uint32_t other = 0;
+    for (int i = 0; i < GN_RT_PACKET; i++) {
+        uint32_t differs = (hits->triangle[i] ^ hits->triangle[lane]) |
+                           (hits->mesh[i] ^ hits->mesh[lane]) |
+                           (hits->mover[i] ^ hits->mover[lane]);
+        other |= hits->met >> i & 1 ? differs : 0;
+    }
+    return other == 0;
+}
+
+/** Bounds of the points of one triangle that rests. */
+static void bound_triangle(const struct spot *spot, const struct gn_rt_packet_hits *hits,
+                           float out_min[static 3], float out_max[static 3])
+{
+    for (int k = 0; k < 3; k++) {
+        float p[GN_RT_PACKET];
+        for (int i = 0; i < GN_RT_PACKET; i++)
+            p[i] = (float)(spot->v0[k] + (double)hits->u[i] * spot->e1[k] +
+                           (double)hits->v[i] * spot->e2[k]);
+        for (uint32_t met = hits->met; met != 0; met &= met - 1) {
+            float x = p[__builtin_ctz(met)];
+            out_min[k] = x < out_min[k] ? x : out_min[k];
+            out_max[k] = x > out_max[k] ? x : out_max[k];
+        }
+    }
+}
+
 void gn_rt_bound_points(const struct gn_rt *rt, const struct gn_rt_packet_hits *hits,
                         float out_min[static 3], float out_max[static 3])
 {
-    struct spot spot = {{0}};
-    int last = -1;
+    int first = hits->met != 0 ? __builtin_ctz(hits->met) : 0;
     for (int k = 0; k < 3; k++) {
         out_min[k] = INFINITY;
         out_max[k] = -INFINITY;
     }
+    if (hits->met != 0 && !get_stand(rt, hits->mover[first]) && is_one_triangle(hits, first)) {
+        const struct spot spot =
+            get_spot(get_mesh(rt, hits->mover[first], hits->mesh[first]), hits->triangle[first]);
+        bound_triangle(&spot, hits, out_min, out_max);
+        return;
+    }
     for (uint32_t met = hits->met; met != 0; met &= met - 1) {
         int i = __builtin_ctz(met);
         const struct rt_stand *stand = get_stand(rt, hits->mover[i]);
-        if (last < 0 || hits->triangle[i] != hits->triangle[last] ||
-            hits->mesh[i] != hits->mesh[last] || hits->mover[i] != hits->mover[last])
-            spot = get_spot(get_mesh(rt, hits->mover[i], hits->mesh[i]), hits->triangle[i]);
+        const struct spot spot =
+            get_spot(get_mesh(rt, hits->mover[i], hits->mesh[i]), hits->triangle[i]);
         double own[3];
         double p[3];
         get_point(&spot, hits->u[i], hits->v[i], own);
@@ -291,7 +323,6 @@ void gn_rt_bound_points(const struct gn_rt *rt, const struct gn_rt_packet_hits *
             out_min[k] = x < out_min[k] ? x : out_min[k];
             out_max[k] = x > out_max[k] ? x : out_max[k];
         }
-        last = i;
     }
 }
 
