@@ -56,11 +56,12 @@ static const struct gn_option table[] = {
     {ROOM, .key = "scene", .value_name = "FILE", .is_required = true,
      .help = "The scene: real and virtual objects. A relative path counts from the configuration "
              "file's folder."},
-    {ROOM, .key = "budget-ms", .type = GN_OPTION_DOUBLE, .min = 0,
-     .max = GN_LIMIT_BUDGET_MS, .default_value = "0",
-     .help = "Time for each interactive frame, from decoding to the encoded result: lights, rays at "
-             "edges and the shadow's resolution are chosen to fit with the least error. 0: none; a "
-             "frame may bring its own, and the shorter counts. docs/architecture.md."},
+    {ROOM, .key = "budget-ms", .type = GN_OPTION_DOUBLE, .min = 0, .max = GN_LIMIT_BUDGET_MS,
+     .default_value = "0",
+     .help =
+         "Time for each interactive frame, from decoding to the encoded result: lights, rays at "
+         "edges and the shadow's resolution are chosen to fit with the least error. 0: none; a "
+         "frame may bring its own, and the shorter counts. docs/architecture.md."},
     {ROOM, .key = "light-method", .type = GN_OPTION_ENUM, .choices = GN_LIGHT_METHOD_NAMES,
      .default_value = "partition",
      .help = "How lights are made from the radiance map. partition: the 2007 paper's regions, each "
@@ -69,9 +70,10 @@ static const struct gn_option table[] = {
              "moved to where the energy is; quadtree: leaves of a tree that holds still in video."},
     {ROOM, .key = "lights", .type = GN_OPTION_INT, .min = 1, .max = GN_LIGHTS_MAX,
      .default_value = "64",
-     .help = "Lights to aim at, with every method but seed; with budget-ms the most there are, then "
-             "256 where nothing is said. A sun's disc is spread over 8 to 32 "
-             "directions besides, so a frame's receipt may count more."},
+     .help =
+         "Lights to aim at, with every method but seed; with budget-ms the most there are, then "
+         "256 where nothing is said. A sun's disc is spread over 8 to 32 "
+         "directions besides, so a frame's receipt may count more."},
     {ROOM, .key = "light-rings", .type = GN_OPTION_INT, .min = 0, .max = 64, .default_value = "0",
      .help = "Rings of the base division of a hemisphere; 0: the method's own."},
     {ROOM, .key = "light-sectors", .type = GN_OPTION_INT, .min = 0, .max = 256,

@@ -74,7 +74,8 @@ struct gn_radiance_map {
     struct gn_map_table *table;       // shared (ref) by the maps of one stream
     struct gn_map_geometry *geometry; // shared (ref) too; NULL: local model, all light is distant
     struct gn_code_table *codes;      // shared (ref) too; NULL: float frame
-    struct gn_map_row *rows;          // [height], owned: sums of its making; in a copy those of what was copied
+    struct gn_map_row
+        *rows; // [height], owned: sums of its making; in a copy those of what was copied
     struct gn_projection projection;
     struct gn_image radiance;     // [height][width][3] linear Rec.709, finite, >= 0; 0 outside
     const float *solid_angle;     // [height][width] sr, 0 outside the valid circle; the table's

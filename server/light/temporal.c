@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#include "server/light/temporal_step.h"
+#include "server/light/temporal.h"
 
 #include <errno.h>
 #include <math.h>
@@ -9,6 +9,7 @@
 
 #include "common/clock.h"
 #include "server/light/luminance.h"
+#include "server/light/temporal_step.h"
 
 /* Nearer to the raw value than this share of it is there: below what a float can tell. */
 static const double share_settled = 1e-7;
