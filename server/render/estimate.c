@@ -2,14 +2,13 @@
 /* SPDX-License-Identifier: ISC */
 #include "server/render/estimate.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/clock.h"
-#include "server/light/luminance.h"
-#include "server/light/map_rows.h"
 
 /** Pixels of one piece of work, and the most pieces. */
 enum { CHUNK = 64, MAX_CHUNKS = 2 * ESTIMATE_PIXELS / CHUNK };
@@ -23,11 +22,12 @@ struct sums {
 
 struct job {
     const struct frame *frame;
+    const struct frame *truth; // with the reference's near lights
     const struct estimate *estimate;
     int step, columns, n_cells; // a pixel from each square of step x step
     int part, n_parts;          // of the cells; each has sets of its own
     int n_sets;                 // that pixels take theirs from
-    bool has_blockers;
+    bool has_blockers, has_map;
     struct sums sums[MAX_CHUNKS];
 };
 
@@ -39,181 +39,6 @@ struct view {
     uint8_t is_cut[ESTIMATE_SET];
     int n_cut;
 };
-
-/** Mixes all bits. Source: Steele et al., "Fast splittable pseudorandom number generators", 2014,
- * with the constants of Stafford's variant 13. */
-static uint64_t mix(uint64_t x)
-{
-    x += UINT64_C(0x9e3779b97f4a7c15);
-    x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
-    return x ^ x >> 31;
-}
-
-/** Point i of Sobol's first two dimensions. Source: Kollig and Keller, "Efficient multidimensional
- * sampling", 2002. `shift` turns it into a random one, and leaves 256 of them a net. */
-static void get_point(uint32_t i, uint64_t shift, double out[static 2])
-{
-    uint32_t x = (uint32_t)shift, y = (uint32_t)(shift >> 32);
-    for (uint32_t k = i, u = 1u << 31, v = 1u << 31; k != 0; k >>= 1, u >>= 1, v ^= v >> 1) {
-        x ^= k & 1 ? u : 0;
-        y ^= k & 1 ? v : 0;
-    }
-    out[0] = (x + 0.5) * 0x1p-32;
-    out[1] = (y + 0.5) * 0x1p-32;
-}
-
-/** Its index along the curve of Morton 1966 through squares of 1/16 x 1/16, each of which has one
- * point of a net: so packets hold neighbours. */
-static int get_place(const double at[static 2])
-{
-    int x = (int)(at[0] * 16), y = (int)(at[1] * 16), place = 0;
-    for (int bit = 0; bit < 4; bit++)
-        place |= (x >> bit & 1) << 2 * bit | (y >> bit & 1) << (2 * bit + 1);
-    return place;
-}
-
-/* Making the sets */
-
-static double get_patches_sum(const struct gn_radiance_map *map, int y)
-{
-    double sum = 0;
-    for (int k = 0; k < GN_MAP_PATCHES; k++)
-        sum += map->rows[y].luminance[k];
-    return sum;
-}
-
-static double get_texel_power(const struct gn_radiance_map *map, size_t i)
-{
-    return gn_luminance(map->radiance.data + 3 * i) * (double)map->solid_angle[i];
-}
-
-/** Luminance that comes from where the map shows nothing, and of the whole sphere as bright. */
-static double get_fill_power(const struct gn_radiance_map *map, double *out_sphere)
-{
-    double y = map->is_full_sphere ? 0 : gn_luminance(map->fill);
-    *out_sphere = map->fill_solid_angle > 0 ? 4 * M_PI * y : 0;
-    return *out_sphere > 0 ? map->fill_solid_angle * y : 0;
-}
-
-static void set_direction(struct estimate_set *set, int i, const double dir[static 3],
-                          const float radiance[static 3], double solid_angle)
-{
-    for (int k = 0; k < 3; k++) {
-        set->dir[k][i] = (float)dir[k];
-        set->irradiance[k][i] = (float)((double)radiance[k] * solid_angle);
-    }
-}
-
-/** A direction that the map does not show: one of the sphere; dark where the map shows it. */
-static void draw_fill(const struct gn_radiance_map *map, const double at[static 2],
-                      double probability, struct estimate_set *set, int i)
-{
-    static const float dark[3] = {0};
-    double z = 1 - 2 * at[0], r = sqrt(fmax(0, 1 - z * z)), phi = 2 * M_PI * at[1], xy[2];
-    double dir[3] = {r * cos(phi), r * sin(phi), z};
-    bool is_shown = gn_projection_get_position(&map->projection, dir, xy);
-    gn_pose_rotate(&map->world_from_probe, dir, dir);
-    set_direction(set, i, dir, is_shown ? dark : map->fill,
-                  4 * M_PI / (ESTIMATE_SET * probability));
-}
-
-/** A direction of the map by the point: a row, a patch of it, a texel of that, a place in it. Any
- * wrong sum of a row or patch changes the density, which is divided by, and not the mean. */
-static void draw_texel(const struct gn_radiance_map *map, const double *rows, double at_row,
-                       double at_column, double probability, struct estimate_set *set, int i)
-{
-    static const double up[3] = {0, 0, 1};
-    static const float dark[3] = {0};
-    int low = 0, high = map->radiance.height, width = map->radiance.width;
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        *(rows[middle] <= at_row ? &low : &high) = middle;
-    }
-    double row = rows[low + 1] - rows[low], left = at_column * row;
-    const double *patches = map->rows[low].luminance;
-    int patch = 0, side = map->table->patch_side;
-    while (patch < GN_MAP_PATCHES - 1 && left >= patches[patch])
-        left -= patches[patch++];
-    while (patch > 0 && !(patches[patch] > 0)) // rounded past the last
-        patch--;
-    int x = patch * side, end = x + side < width ? x + side : width;
-    double sum = 0, power = 0;
-    size_t first = (size_t)low * (size_t)width;
-    for (int k = x; k < end; k++)
-        sum += get_texel_power(map, first + (size_t)k);
-    if (!(row > 0) || !(sum > 0) || x >= end) {
-        set_direction(set, i, up, dark, 0);
-        return;
-    }
-    left = fmin(fmax(left / patches[patch], 0), 1) * sum;
-    while (x < end - 1 && left >= (power = get_texel_power(map, first + (size_t)x))) {
-        left -= power;
-        x++;
-    }
-    size_t texel = first + (size_t)x;
-    power = get_texel_power(map, texel);
-    if (!(power > 0)) {
-        set_direction(set, i, up, dark, 0);
-        return;
-    }
-    double along = fmin(fmax(left / power, 0), 1), dir[3];
-    if (gn_projection_get_direction(&map->projection, x + along,
-                                    low + fmin((at_row - rows[low]) / row, 1), dir))
-        gn_pose_rotate(&map->world_from_probe, dir, dir);
-    else
-        for (size_t k = 0; k < 3; k++)
-            dir[k] = map->direction_world[3 * texel + k];
-    double share = patches[patch] / rows[map->radiance.height] * power / sum;
-    set_direction(set, i, dir, map->radiance.data + 3 * texel,
-                  (double)map->solid_angle[texel] / (ESTIMATE_SET * probability * share));
-}
-
-static int reserve_rows(struct estimate *estimate, int n)
-{
-    if (n <= estimate->capacity)
-        return 0;
-    free(estimate->rows);
-    estimate->capacity = 0;
-    estimate->rows = malloc(((size_t)n + 1) * sizeof(*estimate->rows));
-    estimate->capacity = estimate->rows ? n : 0;
-    return estimate->rows ? 0 : -ENOMEM;
-}
-
-/** True where the probe's map can be drawn from. */
-static bool is_drawable(const struct gn_radiance_map *map)
-{
-    // Light of the global model starts at finite places, which these directions have not.
-    return map && map->rows && !map->geometry;
-}
-
-/** Fills the probe's sets. *out_power: the map's luminance. */
-static void draw_sets(struct estimate *estimate, const struct job *job, int probe,
-                      const struct gn_radiance_map *map, double *out_power)
-{
-    double sphere, fill = get_fill_power(map, &sphere), *rows = estimate->rows;
-    rows[0] = 0;
-    for (int y = 0; y < map->radiance.height; y++)
-        rows[y + 1] = rows[y] + get_patches_sum(map, y);
-    double shown = rows[map->radiance.height];
-    *out_power = shown + fill;
-    if (!(*out_power > 0))
-        return;
-    double share = shown / (shown + sphere);
-    for (int i = 0; i < job->n_sets * ESTIMATE_SET; i++) {
-        int set = i / ESTIMATE_SET,
-            drawn = (job->part * GN_PROBES_MAX + probe) * ESTIMATE_SETS + set;
-        double at[2];
-        get_point((uint32_t)(i % ESTIMATE_SET), mix((uint64_t)drawn), at);
-        int place = get_place(at);
-        if (at[0] < share)
-            draw_texel(map, rows, at[0] / share * shown, at[1], share, &estimate->sets[probe][set],
-                       place);
-        else
-            draw_fill(map, (const double[2]){(at[0] - share) / (1 - share), at[1]}, 1 - share,
-                      &estimate->sets[probe][set], place);
-    }
-}
 
 /* Asking a pixel */
 
@@ -295,7 +120,28 @@ static void add_view(const struct view *view, double sums[static 2][3])
     }
 }
 
-/** The factor of one set of directions. is_affected: it is needed though nothing is cut. */
+/** Adds the room's near light, and what virtual objects cut of it. Returns whether they do. */
+static bool add_near(const struct job *job, const struct sample *s, int set,
+                     double sums[static 2][3], uint64_t *rays)
+{
+    const struct frame *truth = job->truth;
+    double near[2][3] = {{0}};
+    uint64_t random = gn_estimate_mix(s->seed ^ gn_estimate_mix((uint64_t)set));
+    double shift = (double)(random >> 11) * 0x1p-53;
+    bool is_cut = false;
+    for (int i = 0; i < ESTIMATE_NEAR && truth->near.n_real > 0; i++)
+        gn_near_reference_ask(truth, s, truth->options.shadow_unweighted,
+                              (i + shift) / ESTIMATE_NEAR, gn_estimate_mix(random + (uint64_t)i),
+                              near, rays);
+    for (int k = 0; k < 3; k++) {
+        sums[0][k] += near[0][k] / ESTIMATE_NEAR;
+        sums[1][k] += near[1][k] / ESTIMATE_NEAR;
+        is_cut |= near[1][k] > 0;
+    }
+    return is_cut;
+}
+
+/** The factor of one set of directions. */
 static void get_ratio(const struct job *job, struct scratch *scratch, const struct sample *s,
                       int set, double out[static 3], uint64_t *rays)
 {
@@ -303,20 +149,21 @@ static void get_ratio(const struct job *job, struct scratch *scratch, const stru
     double sums[2][3] = {{0}};
     float axis[3], cosine = get_cone(frame, s->org, axis);
     struct view views[GN_PROBES_MAX];
-    int n_cut = 0;
-    for (int p = 0; p < frame->blend.n; p++) {
+    bool is_cut = add_near(job, s, set, sums, rays);
+    for (int p = 0; p < frame->blend.n && job->has_map; p++) {
         init_view(s, &job->estimate->sets[p][set], frame->blend.n > 1 ? s->weights[p] : 1, axis,
                   cosine, &views[p]);
         trace(frame, scratch, s, GN_RT_VIRTUAL, &views[p], rays);
-        n_cut += views[p].n_cut;
+        is_cut |= views[p].n_cut > 0;
     }
-    for (int p = 0; p < frame->blend.n && n_cut > 0; p++) {
+    for (int p = 0; p < frame->blend.n && job->has_map && is_cut; p++) {
         if (job->has_blockers)
             trace(frame, scratch, s, GN_RT_REAL, &views[p], rays);
         add_view(&views[p], sums);
     }
     for (int k = 0; k < 3; k++)
-        out[k] = sums[0][k] > frame->floor_irradiance[k] ? 1 - sums[1][k] / sums[0][k] : 1;
+        out[k] =
+            is_cut && sums[0][k] > frame->floor_irradiance[k] ? 1 - sums[1][k] / sums[0][k] : 1;
 }
 
 static void ask_pixel(const struct job *job, struct scratch *scratch, const struct sample *s,
@@ -351,13 +198,15 @@ static void ask_chunk(void *context, int item, int worker)
     int pixels[CHUNK][2];
     int n = 0, width = frame->camera->width, height = frame->camera->height;
     for (int cell = item * CHUNK; cell < (item + 1) * CHUNK && cell < job->n_cells; cell++) {
-        uint64_t random = mix((uint64_t)cell);
+        uint64_t random = gn_estimate_mix((uint64_t)cell);
         int x = cell % job->columns * job->step + (int)(random % (uint64_t)job->step);
         int y = cell / job->columns * job->step + (int)((random >> 32) % (uint64_t)job->step);
-        if (x >= width || y >= height || (int)(mix(random) % (uint64_t)job->n_parts) != job->part)
+        if (x >= width || y >= height ||
+            (int)(gn_estimate_mix(random) % (uint64_t)job->n_parts) != job->part)
             continue;
         pixels[n][0] = x;
         pixels[n][1] = y;
+        scratch->samples[n].seed = gn_estimate_mix(random);
         gn_primary_aim(frame, frame->rays + 3 * ((size_t)y * (size_t)width + (size_t)x),
                        &scratch->samples[n]);
         n++;
@@ -370,7 +219,8 @@ static void ask_chunk(void *context, int item, int worker)
         uint64_t pixel = (uint64_t)at[1] * (uint64_t)width + (uint64_t)at[0];
         if (scratch->samples[i].is_receiver)
             ask_pixel(job, scratch, &scratch->samples[i],
-                      gn_refine_get_feature(frame, at[0], at[1])->color, mix(~pixel), &sums);
+                      gn_refine_get_feature(frame, at[0], at[1])->color, gn_estimate_mix(~pixel),
+                      &sums);
     }
     job->sums[item] = sums;
 }
@@ -413,34 +263,69 @@ static void sum_up(const struct job *job, int n_chunks, struct gn_render_report 
     report->estimated_error = gn_error_sums_get(&report->error, 1);
 }
 
-int gn_estimate_make(struct estimate *estimate, const struct frame *frame, struct gn_pool *pool,
+bool gn_estimate_needs_near(const struct frame *frame)
+{
+    return frame->options.estimate_error && !frame->pass && frame->run_shadow &&
+           frame->near.n_real > 0 && frame->near.n_placed == 0 &&
+           frame->options.quality != GN_QUALITY_REFERENCE;
+}
+
+static const char *why_not(const struct frame *frame)
+{
+    if (frame->options.quality == GN_QUALITY_REFERENCE || frame->pass)
+        return "it is the reference itself";
+    if (!frame->options.estimate_error)
+        return "not asked for";
+    if (!frame->run_shadow)
+        return "there is no shadow to be off";
+    if (frame->near.n_placed > 0)
+        return "the global model's light starts at finite places, which are not drawn from";
+    for (int p = 0; p < frame->blend.n; p++) {
+        if (!gn_estimate_can_draw(frame->blend.state[p]->map))
+            return "no map to draw directions from";
+    }
+    return NULL;
+}
+
+static void set_line(struct gn_render_report *report, const char *why_not, const char *why)
+{
+    assert(report->n_plan < GN_PLAN_MAX);
+    report->plan[report->n_plan++] =
+        (struct gn_plan_entry){.pass = "estimate", .ran = !why_not, .why = why_not ? why_not : why};
+}
+
+int gn_estimate_make(struct estimate *estimate, const struct frame *frame,
+                     const struct near_lights *near, struct gn_pool *pool,
                      struct gn_render_report *report)
 {
     int64_t start_ns = gn_clock_get_monotonic_ns();
     double power = 0;
-    struct job job = {.frame = frame, .estimate = estimate, .n_parts = 1, .n_sets = ESTIMATE_SETS};
+    struct frame truth = *frame;
+    struct job job = {.frame = frame,
+                      .truth = &truth,
+                      .estimate = estimate,
+                      .n_parts = 1,
+                      .n_sets = ESTIMATE_SETS};
+    const char *reason = why_not(frame);
+    report->estimated_error = -1;
     if (frame->options.estimate_parts > 1) {
         job.n_parts = frame->options.estimate_parts;
         job.part = frame->options.estimate_part;
         job.n_sets = 2;
     }
-    report->estimated_error = -1;
-    // Without a map of the light there is no truth to ask; near light is not in it.
-    if (frame->options.quality == GN_QUALITY_REFERENCE || !frame->options.estimate_error ||
-        !frame->run_shadow || frame->near.n > 0)
-        return 0;
-    for (int p = 0; p < frame->blend.n; p++) {
+    truth.near = *near;
+    for (int p = 0; p < frame->blend.n && !reason; p++) {
         double one;
-        const struct gn_radiance_map *map = frame->blend.state[p]->map;
-        if (!is_drawable(map))
-            return 0;
-        if (reserve_rows(estimate, map->radiance.height) < 0)
+        if (gn_estimate_draw(estimate, job.part, job.n_sets, p, frame->blend.state[p]->map, &one) <
+            0)
             return -ENOMEM;
-        memset(estimate->sets[p], 0, sizeof(estimate->sets[p]));
-        draw_sets(estimate, &job, p, map, &one);
         power += one;
     }
-    if (!(power > 0))
+    job.has_map = power > 0;
+    if (!reason && !job.has_map && near->n_real == 0)
+        reason = "no light";
+    set_line(report, reason, "some pixels ask the map, the lamps and the screens what is right");
+    if (reason)
         return 0;
     // Flat real geometry hides no light from itself.
     job.has_blockers = frame->run_blockers || frame->options.shadow_ignore_real;

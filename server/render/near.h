@@ -113,6 +113,11 @@ void gn_near_reference_sum(const struct frame *frame, const struct sample *sampl
 /** Adds what virtual lights send to a real sample to its gain. */
 void gn_near_reference_gain(const struct frame *frame, struct sample *sample,
                             struct tile_figures *figures);
+/** Irradiance of a receiver by one of the room's near lights, chosen by u [0, 1) and seen at a
+ * point by `random`, over its probability: adds what real objects let through to sums[0], and what
+ * of it virtual ones cut to sums[1]; 0 where the light chosen is a virtual one's. */
+void gn_near_reference_ask(const struct frame *frame, const struct sample *sample, bool even,
+                           double u, uint64_t random, double sums[static 2][3], uint64_t *rays);
 /** Irradiance of a surface by one near light chosen by `random`, over its probability; the light's
  * role. For walks. */
 void gn_near_reference_try(const struct frame *frame, const struct gn_surface *surface,

@@ -355,14 +355,9 @@ void gn_near_reference_sum(const struct frame *frame, const struct sample *s, bo
     }
 }
 
-void gn_near_reference_try(const struct frame *frame, const struct gn_surface *surface,
-                           const float org[static 3], enum gn_rt_set set, uint64_t random,
-                           double out_irradiance[static 3], enum gn_rt_set *out_role,
-                           uint64_t *rays)
+/** The light whose part of the powers' sum holds u. */
+static int choose_light(const struct near_lights *near, double u, double *out_probability)
 {
-    const struct near_lights *near = &frame->near;
-    const struct receiver receiver = {surface, org, false};
-    double u = next_unit(&random);
     int lo = 0;
     int hi = near->n - 1;
     while (lo < hi) {
@@ -372,8 +367,41 @@ void gn_near_reference_try(const struct frame *frame, const struct gn_surface *s
         else
             lo = mid + 1;
     }
+    *out_probability = near->cdf[lo] - (lo > 0 ? near->cdf[lo - 1] : 0);
+    return lo;
+}
+
+void gn_near_reference_ask(const struct frame *frame, const struct sample *s, bool even, double u,
+                           uint64_t random, double sums[static 2][3], uint64_t *rays)
+{
+    const struct receiver receiver = {&s->surface, s->org, even};
+    double probability;
+    int l = choose_light(&frame->near, u, &probability);
+    const struct gn_near_light *light = &frame->near.lights[l];
+    if (light->role != GN_RT_REAL || !(probability > 0))
+        return;
+    struct near_ray ray;
+    int n_parts = count_parts(light, &receiver);
+    int part = (int)(next_unit(&random) * n_parts);
+    double weight = see_part(frame, l, part, n_parts, &receiver, random, &ray) * n_parts;
+    if (!(weight > 0) || is_hidden(frame, GN_RT_REAL, &receiver, &ray, rays))
+        return;
+    add_light(light, weight / probability, sums[0]);
+    if (gn_box_may_meet(&frame->virtual_box, s->org, ray.dir) &&
+        is_hidden(frame, GN_RT_VIRTUAL, &receiver, &ray, rays))
+        add_light(light, weight / probability, sums[1]);
+}
+
+void gn_near_reference_try(const struct frame *frame, const struct gn_surface *surface,
+                           const float org[static 3], enum gn_rt_set set, uint64_t random,
+                           double out_irradiance[static 3], enum gn_rt_set *out_role,
+                           uint64_t *rays)
+{
+    const struct near_lights *near = &frame->near;
+    const struct receiver receiver = {surface, org, false};
+    double probability;
+    int lo = choose_light(near, next_unit(&random), &probability);
     const struct gn_near_light *light = &near->lights[lo];
-    double probability = near->cdf[lo] - (lo > 0 ? near->cdf[lo - 1] : 0);
     int n_parts = count_parts(light, &receiver);
     int part = (int)(next_unit(&random) * n_parts);
     struct near_ray ray;

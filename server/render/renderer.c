@@ -458,7 +458,11 @@ static int render_frame(struct gn_renderer *renderer, struct frame *frame,
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
     gn_report_fill(frame, renderer->n_workers, &report);
-    ret = gn_estimate_make(renderer->estimate, frame, renderer->pool, &report);
+    struct near_lights near = {0};
+    if (gn_estimate_needs_near(frame))
+        ret = gn_near_prepare(&renderer->near, renderer->scene, light, true, &near);
+    if (ret == 0)
+        ret = gn_estimate_make(renderer->estimate, frame, &near, renderer->pool, &report);
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
     report.ms_total = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);

@@ -236,6 +236,78 @@ static void test_shadow_of_a_disc_under_a_lamp(void **state)
     finish(&s);
 }
 
+/** RMS difference of two pictures' factors where either is a shadow. */
+static double compare(const struct gn_image *a, const struct gn_image *b)
+{
+    double sum = 0;
+    int n = 0;
+    for (int i = 0; i < a->width * a->height; i++) {
+        const float *x = a->data + (size_t)i * 3, *y = b->data + (size_t)i * 3;
+        for (int k = 0; k < 3 && (x[1] < 0.995f || y[1] < 0.995f); k++) {
+            sum += ((double)x[k] - (double)y[k]) * ((double)x[k] - (double)y[k]);
+            n++;
+        }
+    }
+    assert_true(n > 300);
+    return sqrt(sum / n);
+}
+
+static void paint_sky(void *context, const double dir[static 3], float out_rgb[static 3])
+{
+    (void)context;
+    for (int k = 0; k < 3; k++)
+        out_rgb[k] = dir[2] > 0.5 && dir[0] > 0.3 ? 0.1f : 0;
+}
+
+/** Renders as both and returns the true error; *out_estimated: what the frame says. */
+static double judge(struct lit_stage *s, double *out_estimated)
+{
+    const double eye[3] = {0, -3, 2.2}, target[3] = {0, 0, 0};
+    const struct gn_render_options exact = {.quality = GN_QUALITY_REFERENCE, .single_ray = true};
+    const struct gn_render_options fast = {.single_ray = true, .estimate_error = true};
+    struct gn_image truth;
+    gn_test_stage_aim(&s->stage, 96, 72, 80, eye, target);
+    gn_test_stage_render(&s->stage, &exact);
+    truth = s->stage.layers.shadow;
+    memset(&s->stage.layers.shadow, 0, sizeof(s->stage.layers.shadow));
+    gn_layers_finish(&s->stage.layers);
+    gn_test_stage_render(&s->stage, &fast);
+    *out_estimated = s->stage.report.estimated_error;
+    double error = compare(&truth, &s->stage.layers.shadow);
+    gn_image_finish(&truth);
+    return error;
+}
+
+static void test_the_error_of_near_light_is_known(void **state)
+{
+    (void)state;
+    static const int n_pieces[] = {1, 4, 16};
+    const struct gn_scene_light lamp = {{1, 0, 2}, {1, 2, 3}, 0.2f, GN_RT_REAL};
+    for (int with_sky = 0; with_sky < 2; with_sky++) {
+        double last = INFINITY;
+        for (size_t i = 0; i < sizeof(n_pieces) / sizeof(n_pieces[0]); i++) {
+            struct lit_stage s = {0};
+            double estimated;
+            add_floor(&s, GN_RT_REAL);
+            add_screen(&s, GN_RT_REAL, gn_test_make_plane(1, 1), 1.5, 3);
+            gn_test_stage_add(&s.stage, GN_RT_VIRTUAL, gn_test_make_disc(0.3f, 64), 0, 0, 0.5,
+                              GN_MATERIAL_DIFFUSE, grey);
+            light(&s, &lamp, 1, n_pieces[i]);
+            if (with_sky) {
+                gn_test_stage_set_map(&s.stage, 64, 32, paint_sky, NULL);
+                gn_test_stage_set_lights_from_map(&s.stage, 8);
+            }
+            double error = judge(&s, &estimated);
+            print_message("# %d pieces and a lamp%s: off by %.4f, estimated %.4f\n", n_pieces[i],
+                          with_sky ? ", sky" : "", error, estimated);
+            assert_true(estimated > error / 1.5 && estimated < 1.5 * error);
+            assert_true(estimated < last);
+            last = estimated;
+            finish(&s);
+        }
+    }
+}
+
 static void test_real_objects_hide_near_light(void **state)
 {
     (void)state;
@@ -257,7 +329,7 @@ static void test_real_objects_hide_near_light(void **state)
         print_message("# real disc %d: factor %g, expected %g\n", with_real, (double)fast,
                       (double)expected);
         assert_true(fabsf(fast - expected) < 1e-5f);
-        assert_true(s.stage.report.estimated_error < 0); // no map says what near light should do
+        assert_true(s.stage.report.estimated_error < 0); // not asked for
         assert_int_equal(s.stage.report.n_lights, 2);
         assert_true(fabsf(get_factor(&s, 0, &reference) - expected) < 1e-5f);
         finish(&s);
@@ -438,6 +510,7 @@ int main(void)
         cmocka_unit_test(test_rectangle_over_a_plane),
         cmocka_unit_test(test_disc_on_its_axis),
         cmocka_unit_test(test_shadow_of_a_disc_under_a_lamp),
+        cmocka_unit_test(test_the_error_of_near_light_is_known),
         cmocka_unit_test(test_real_objects_hide_near_light),
         cmocka_unit_test(test_penumbra_of_a_ball_under_a_screen),
         cmocka_unit_test(test_virtual_light_is_added),
