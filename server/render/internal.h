@@ -430,6 +430,10 @@ void gn_specular_shade(const struct frame *frame, struct scratch *scratch, int n
 
 /** Has the scene what the pass is for: a real mirror or glass and a virtual object? */
 bool gn_optics_is_needed(const struct gn_scene *scene);
+/** Is some of the object a mirror, glass, or so polished that it mirrors? */
+bool gn_optics_may_show(const struct gn_scene_object *object);
+/** Does the surface? */
+bool gn_optics_is_shown_by(const struct gn_surface *surface);
 /** Memory for the workers' scratches, where the scene needs it. Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_optics_reserve(const struct gn_scene *scene, struct scratch *scratches,
                                   int n_workers);

@@ -65,9 +65,35 @@ struct tree {
     struct tile_figures *figures;
 };
 
+static bool is_optic(const struct gn_material *material)
+{
+    return (CLEAR_MATERIALS >> material->type & 1) ||
+           (material->type == GN_MATERIAL_GGX &&
+            material->roughness * material->roughness < (float)GGX_MIN_ALPHA);
+}
+
+bool gn_optics_may_show(const struct gn_scene_object *object)
+{
+    bool is_any = object->has_material && is_optic(&object->material);
+    // Of a mesh's own materials a picture may say how rough they are.
+    for (int m = 0; !object->has_material && m < object->mesh.n_materials; m++)
+        is_any |= object->mesh.materials[m].factors.type != GN_MATERIAL_DIFFUSE;
+    return is_any;
+}
+
 bool gn_optics_is_needed(const struct gn_scene *scene)
 {
-    return (scene->real_materials & CLEAR_MATERIALS) != 0 && scene->n_virtual_triangles > 0;
+    bool is_any = false;
+    for (int i = 0; i < scene->n_objects && scene->n_virtual_triangles > 0; i++)
+        is_any |= scene->objects[i].role == GN_RT_REAL && gn_optics_may_show(&scene->objects[i]);
+    return is_any;
+}
+
+bool gn_optics_is_shown_by(const struct gn_surface *surface)
+{
+    const struct gn_material material = {.type = surface->material,
+                                         .roughness = surface->roughness};
+    return is_optic(&material);
 }
 
 int gn_optics_reserve(const struct gn_scene *scene, struct scratch *scratches, int n_workers)
@@ -85,11 +111,6 @@ void gn_optics_finish(struct scratch *scratch)
 {
     free(scratch->optics);
     scratch->optics = NULL;
-}
-
-static bool is_clear(const struct gn_surface *surface)
-{
-    return (CLEAR_MATERIALS >> surface->material & 1) != 0;
 }
 
 static bool is_rough(const struct gn_surface *surface)
@@ -121,33 +142,6 @@ static void push(struct tree *tree, const struct way *way)
         optics->ways[optics->n_ways++] = *way;
 }
 
-/** On from a clear surface that `way` has met. */
-static void split(struct tree *tree, const struct gn_surface *surface, const struct way *way)
-{
-    struct way on = *way;
-    on.depth++;
-    memcpy(on.point, surface->point, sizeof(on.point));
-    gn_surface_get_origin(surface, on.org);
-    if (surface->material == GN_MATERIAL_MIRROR) {
-        gn_shade_reflect(surface, on.dir);
-        for (int k = 0; k < 3; k++)
-            on.weight[k] *= (double)surface->albedo[k];
-        push(tree, &on);
-        return;
-    }
-    struct glass_ray rays[2];
-    const double u[2] = {random_unit(&tree->random), random_unit(&tree->random)};
-    gn_glass_split(surface, way->dir, u, &rays[0], &rays[1]);
-    for (int i = 0; i < 2; i++) {
-        if (i == 1)
-            gn_surface_get_origin_behind(surface, on.org);
-        memcpy(on.dir, rays[i].dir, sizeof(on.dir));
-        for (int k = 0; k < 3; k++)
-            on.weight[k] = way->weight[k] * rays[i].weight[k];
-        push(tree, &on);
-    }
-}
-
 static void add_end(struct tree *tree, const struct gn_surface *surface, const struct way *way)
 {
     struct optics *optics = tree->optics;
@@ -170,6 +164,60 @@ static void add_end(struct tree *tree, const struct gn_surface *surface, const s
     tree->figures->n_receivers += s->is_receiver;
 }
 
+/** On from a polished surface; its base is an end. */
+static void split_ggx(struct tree *tree, const struct gn_surface *surface, const struct way *on)
+{
+    static const double u[2] = {0.5, 0.5};
+    struct ggx ggx;
+    struct way reflected = *on;
+    struct gn_surface base = *surface;
+    double weight[3];
+    double pdf;
+    gn_ggx_init(surface, on->dir, &ggx);
+    for (int k = 0; k < 3; k++)
+        base.albedo[k] = (float)ggx.base[k];
+    if ((base.albedo[0] > 0 || base.albedo[1] > 0 || base.albedo[2] > 0) &&
+        tree->optics->n_ends - tree->first < MAX_ENDS)
+        add_end(tree, &base, on);
+    if (!gn_ggx_sample(&ggx, u, reflected.dir, weight, &pdf) ||
+        !(dot3(reflected.dir, surface->normal_horizon) > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        reflected.weight[k] *= weight[k];
+    push(tree, &reflected);
+}
+
+/** On from a clear surface that `way` has met. */
+static void split(struct tree *tree, const struct gn_surface *surface, const struct way *way)
+{
+    struct way on = *way;
+    on.depth++;
+    memcpy(on.point, surface->point, sizeof(on.point));
+    gn_surface_get_origin(surface, on.org);
+    if (surface->material == GN_MATERIAL_MIRROR) {
+        gn_shade_reflect(surface, on.dir);
+        for (int k = 0; k < 3; k++)
+            on.weight[k] *= (double)surface->albedo[k];
+        push(tree, &on);
+        return;
+    }
+    if (surface->material == GN_MATERIAL_GGX) {
+        split_ggx(tree, surface, &on);
+        return;
+    }
+    struct glass_ray rays[2];
+    const double u[2] = {random_unit(&tree->random), random_unit(&tree->random)};
+    gn_glass_split(surface, way->dir, u, &rays[0], &rays[1]);
+    for (int i = 0; i < 2; i++) {
+        if (i == 1)
+            gn_surface_get_origin_behind(surface, on.org);
+        memcpy(on.dir, rays[i].dir, sizeof(on.dir));
+        for (int k = 0; k < 3; k++)
+            on.weight[k] = way->weight[k] * rays[i].weight[k];
+        push(tree, &on);
+    }
+}
+
 static void follow(struct tree *tree, struct way *way)
 {
     const struct frame *frame = tree->frame;
@@ -190,7 +238,7 @@ static void follow(struct tree *tree, struct way *way)
         tree->root->shown = tree->root->shown ? tree->root->shown : surface.object + 1;
         way->is_real_only = true;
         push(tree, way);
-    } else if (is_clear(&surface)) {
+    } else if (gn_optics_is_shown_by(&surface)) {
         way->length = length;
         split(tree, &surface, way);
     } else {
@@ -289,7 +337,8 @@ static void weigh_others(const struct frame *frame, struct scratch *scratch, int
     bool is_cut[BATCH] = {false};
     for (int i = 0; i < n; i++) {
         const struct sample *s = &scratch->samples[i];
-        is_cut[s->group] |= s->kind == SAMPLE_REAL && s->is_cut && is_clear(&s->surface);
+        is_cut[s->group] |=
+            s->kind == SAMPLE_REAL && s->is_cut && gn_optics_is_shown_by(&s->surface);
     }
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
@@ -315,7 +364,7 @@ void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n
         gn_shadow_find_groups(frame, scratch->samples, n, is_summed);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
-        if (s->kind != SAMPLE_REAL || !is_clear(&s->surface))
+        if (s->kind != SAMPLE_REAL || !gn_optics_is_shown_by(&s->surface))
             continue;
         struct tree tree = {
             .frame = frame, .optics = optics, .root = s, .parent = i, .figures = figures};
@@ -334,7 +383,7 @@ void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n
     flush(frame, scratch, is_grid, n_paths, figures);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
-        if (s->kind == SAMPLE_REAL && is_clear(&s->surface))
+        if (s->kind == SAMPLE_REAL && gn_optics_is_shown_by(&s->surface))
             set_ratio(s);
     }
     if (is_grid)

@@ -148,7 +148,7 @@ static const char *why_not_optics(const struct frame *frame)
 {
     if (!frame->has_virtual)
         return "the scene has no virtual object";
-    if (!(frame->scene->real_materials & CLEAR_MATERIALS))
+    if (!gn_optics_is_needed(frame->scene))
         return "no mirror or glass among the real objects";
     return NULL;
 }

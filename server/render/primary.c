@@ -142,9 +142,7 @@ static bool is_simple(const struct frame *frame, const struct gn_scene_object *o
         return false;
     if (!frame->run_optics)
         return true;
-    enum gn_material_type type = object->material.type;
-    return object->has_material ? type != GN_MATERIAL_MIRROR && type != GN_MATERIAL_GLASS
-                                : !object->mesh.materials;
+    return !gn_optics_may_show(object);
 }
 
 /* Rays leave a resting surface that is not lifted by its clearance off the point, at most
@@ -186,8 +184,10 @@ void gn_primary_take(const struct frame *frame, const struct sight *sight, int l
     s->depth = hit.distance * s->dir_z;
     gn_surface_get_origin(surface, s->org);
     // A shadow is less light on a diffuse surface; real mirrors and glass show other things.
-    s->is_receiver = s->kind == SAMPLE_REAL && (surface->material == GN_MATERIAL_DIFFUSE ||
-                                                surface->material == GN_MATERIAL_GGX);
+    s->is_receiver =
+        s->kind == SAMPLE_REAL && (surface->material == GN_MATERIAL_DIFFUSE ||
+                                   (surface->material == GN_MATERIAL_GGX &&
+                                    !(frame->run_optics && gn_optics_is_shown_by(surface))));
     s->has_photons = s->is_receiver && frame->run_caustics;
     figures->n_receivers += s->is_receiver;
 }

@@ -55,7 +55,7 @@ static void add_wall(struct gn_test_stage *stage, float size, double x, double z
 }
 
 /** A floor and a virtual ball at x > 0; with a mirror across x = 0, or as seen from behind it. */
-static void init_room(struct gn_test_stage *stage, bool has_mirror)
+static void init_room(struct gn_test_stage *stage, bool has_mirror, enum gn_material_type mirror)
 {
     const double side = has_mirror ? 1 : -1;
     const double eye[3] = {side * 2.5, -1.8, 1.2};
@@ -65,7 +65,8 @@ static void init_room(struct gn_test_stage *stage, bool has_mirror)
     gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.3f, 24), 0.7, 0.2, 0.35,
                       GN_MATERIAL_DIFFUSE, grey);
     if (has_mirror)
-        add_wall(stage, 40, 0, 0, GN_MATERIAL_MIRROR, silver);
+        add_wall(stage, 40, 0, 0, mirror, silver);
+    stage->objects[stage->n_objects - 1].material.metallic = 1; // of ggx
     gn_test_stage_commit(stage, 2);
     gn_test_stage_set_map(stage, 64, 32, paint_right, NULL);
     gn_test_stage_set_lights_from_map(stage, 4);
@@ -73,14 +74,14 @@ static void init_room(struct gn_test_stage *stage, bool has_mirror)
 }
 
 /** The mirror's picture is the one of the camera behind it, its albedo times as bright. */
-static void check_mirror(const struct gn_render_options *options)
+static void check_mirror(enum gn_material_type mirror, const struct gn_render_options *options)
 {
     struct gn_test_stage in_mirror = {0};
     struct gn_test_stage behind = {0};
     int n_virtual = 0;
     int n_shadow = 0;
-    init_room(&in_mirror, true);
-    init_room(&behind, false);
+    init_room(&in_mirror, true, mirror);
+    init_room(&behind, false, mirror);
     gn_test_stage_render(&in_mirror, options);
     gn_test_stage_render(&behind, options);
     assert_true(get_line(&in_mirror)->ran);
@@ -98,8 +99,13 @@ static void check_mirror(const struct gn_render_options *options)
             continue;
         n_virtual += rgba[3] == 1;
         n_shadow += rgba[3] == 0 && shadow[0] < 0.9f;
+        double dir[3];
+        assert_true(gn_camera_get_ray(&in_mirror.camera, x + 0.5, y + 0.5, dir));
+        gn_pose_rotate(&in_mirror.camera.world_from_camera, dir, dir);
         for (int k = 0; k < 3; k++) {
-            assert_float_equal(added[k], silver[k] * rgba[k], 3e-3 * (1 + (double)rgba[k]));
+            double more = mirror == GN_MATERIAL_GGX ? pow(1 - fabs(dir[0]), 5) : 0; // Schlick's
+            double share = silver[k] + (1 - (double)silver[k]) * more;
+            assert_float_equal(added[k], share * rgba[k], 3e-3 * (1 + (double)rgba[k]));
             assert_float_equal(factor[k], rgba[3] == 1 ? 0 : shadow[k], 3e-3);
         }
     }
@@ -115,7 +121,8 @@ static void test_a_mirror_shows_what_is_before_it(void **state)
     for (int quality = 0; quality <= GN_QUALITY_REFERENCE; quality++) {
         const struct gn_render_options options = {.quality = (enum gn_quality)quality,
                                                   .single_ray = true};
-        check_mirror(&options);
+        check_mirror(GN_MATERIAL_MIRROR, &options);
+        check_mirror(GN_MATERIAL_GGX, &options);
     }
 }
 
@@ -165,12 +172,11 @@ static void test_no_light_is_lost_or_won_under_even_light(void **state)
 }
 
 /** A ball and its shadow on a floor, looked down at, with or without a pane between. */
-static void init_pane(struct gn_test_stage *stage, bool has_pane)
+static void init_pane(struct gn_test_stage *stage, bool has_pane, enum gn_material_type floor)
 {
     const double eye[3] = {0.9, 0, 3};
     const double target[3] = {0.9, 0, 0};
-    gn_test_stage_add(stage, GN_RT_REAL, gn_test_make_plane(8, 3), 0, 0, 0, GN_MATERIAL_DIFFUSE,
-                      grey);
+    gn_test_stage_add(stage, GN_RT_REAL, gn_test_make_plane(8, 3), 0, 0, 0, floor, grey);
     gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.3f, 24), 1, 0, 0.35,
                       GN_MATERIAL_DIFFUSE, grey);
     if (has_pane) // near the camera, where it takes no light from the rest
@@ -194,8 +200,8 @@ static void test_a_pane_shows_what_is_behind_it(void **state)
     const double passed = 0.96 * 0.96;
     int n_virtual = 0;
     int n_shadow = 0;
-    init_pane(&through, true);
-    init_pane(&direct, false);
+    init_pane(&through, true, GN_MATERIAL_DIFFUSE);
+    init_pane(&direct, false, GN_MATERIAL_DIFFUSE);
     gn_test_stage_render(&through, &options);
     gn_test_stage_render(&direct, &options);
     for (int i = 0; i < WIDTH * HEIGHT; i++) {
@@ -222,6 +228,36 @@ static void test_a_pane_shows_what_is_behind_it(void **state)
     gn_test_stage_finish(&direct);
 }
 
+/** Where it mirrors what is black, a polished floor has the shadow of a plain one. */
+static void test_a_polished_floor_has_its_shadow(void **state)
+{
+    (void)state;
+    const struct gn_render_options options = {.single_ray = true};
+    struct gn_test_stage polished = {0};
+    struct gn_test_stage plain = {0};
+    int n_shadow = 0;
+    init_pane(&polished, false, GN_MATERIAL_GGX);
+    init_pane(&plain, false, GN_MATERIAL_DIFFUSE);
+    gn_test_stage_render(&polished, &options);
+    gn_test_stage_render(&plain, &options);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        int x = i % WIDTH;
+        int y = i / WIDTH;
+        double p[3];
+        const float *a = gn_image_at(&polished.layers.shadow, x, y);
+        const float *b = gn_image_at(&plain.layers.shadow, x, y);
+        gn_test_stage_get_point(&plain, x + 0.5, y + 0.5, 0, p);
+        if (p[0] > 0.8 || gn_image_at(&plain.layers.virtual_rgba, x, y)[3] > 0)
+            continue;
+        n_shadow += b[0] < 0.5f;
+        for (int k = 0; k < 3; k++)
+            assert_float_equal(a[k], b[k], 1e-4);
+    }
+    assert_true(n_shadow > 20);
+    gn_test_stage_finish(&polished);
+    gn_test_stage_finish(&plain);
+}
+
 static void assert_same(const struct gn_image *a, const struct gn_image *b)
 {
     size_t n = (size_t)WIDTH * HEIGHT * (size_t)a->channels;
@@ -235,8 +271,8 @@ static void test_omissions_change_nothing(void **state)
         struct gn_render_options options = {.quality = (enum gn_quality)quality};
         struct gn_test_stage some = {0};
         struct gn_test_stage all = {0};
-        init_room(&some, true);
-        init_room(&all, true);
+        init_room(&some, true, GN_MATERIAL_MIRROR);
+        init_room(&all, true, GN_MATERIAL_MIRROR);
         gn_test_stage_render(&some, &options);
         options.all_passes = true;
         gn_test_stage_render(&all, &options);
@@ -255,13 +291,13 @@ static void test_the_plan_says_why_not(void **state)
     const double away[3] = {9, -1.8, 1.2};
     const double eye[3] = {2.5, -1.8, 1.2};
     struct gn_test_stage stage = {0};
-    init_room(&stage, false);
+    init_room(&stage, false, GN_MATERIAL_MIRROR);
     gn_test_stage_render(&stage, &options);
     assert_false(get_line(&stage)->ran);
     assert_string_equal(get_line(&stage)->why, "no mirror or glass among the real objects");
     gn_test_stage_finish(&stage);
 
-    init_room(&stage, true);
+    init_room(&stage, true, GN_MATERIAL_MIRROR);
     gn_test_stage_aim(&stage, WIDTH, HEIGHT, 40, eye, away);
     gn_test_stage_render(&stage, &options);
     assert_false(get_line(&stage)->ran);
@@ -287,6 +323,7 @@ int main(void)
         cmocka_unit_test(test_a_mirror_shows_what_is_before_it),
         cmocka_unit_test(test_no_light_is_lost_or_won_under_even_light),
         cmocka_unit_test(test_a_pane_shows_what_is_behind_it),
+        cmocka_unit_test(test_a_polished_floor_has_its_shadow),
         cmocka_unit_test(test_omissions_change_nothing),
         cmocka_unit_test(test_the_plan_says_why_not),
     };
