@@ -75,7 +75,7 @@ unsigned gn_directions_cross(const struct direction_boxes *boxes, const struct o
     int32_t flags[LANES];
     get_bounds(boxes, outline->plane, low, high);
     for (int i = 0; i < LANES; i++)
-        flags[i] = (low[i] <= WIDEN) & (high[i] >= -WIDEN);
+        flags[i] = (low[i] <= outline->width) & (high[i] >= -outline->width);
     unsigned crossed = pack(flags);
     return crossed ? crossed & gn_directions_meet(boxes, &outline->box) : 0;
 }

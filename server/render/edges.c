@@ -13,8 +13,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A triangle seen so nearly edge-on (rad) may be seen from either side.
-#define EDGE_ON 1e-6
+/*
+ * The tracer's test of an edge with ends a, b from the point is the sign of (b - a) x (a + b) . d,
+ * in floats: 2 a x b . d but for less than 30 2^-24 (|a| + |b|)^2 (a and b themselves, their
+ * difference and sum, the products, the sums of three). Over 2 |a| |b| that is ROUNDING times
+ * (|a| + |b|)^2 / (|a| |b|): for an edge of a huge triangle whose one end is near, a wide angle.
+ */
+#define ROUNDING 1e-6
 
 /** One side of a triangle; ends are in order, so that the other triangle's side compares equal. */
 struct side {
@@ -138,20 +143,50 @@ static void get_vertex(const struct clusters *clusters, int vertex, const float 
         out[k] = (double)clusters->vertices[k][vertex] - org[k];
 }
 
-/** -1, 0, 1: the side of the plane that the apex lies on; 0: not sure. */
-static int get_side(const struct clusters *clusters, const double plane[static 3], int apex,
-                    const float org[static 3])
+/** -1, 0, 1: the side of the edge's plane, a x b, that the apex lies on; 0: not sure, as rounding,
+ * of the tracer or (slack) of what moves, may put it on either. */
+static int get_side(const struct clusters *clusters, const double plane[static 3], double ends,
+                    double slack, int apex, const float org[static 3])
 {
     double p[3];
     get_vertex(clusters, apex, org, p);
     double x = dot(plane, p);
-    double limit = EDGE_ON * sqrt(dot(plane, plane) * dot(p, p));
+    double length = sqrt(dot(p, p));
+    double limit =
+        ROUNDING * ends * ends * length + slack * (ends * length + sqrt(dot(plane, plane)));
     return (x > limit) - (x < -limit);
+}
+
+/** Distance of the origin from the segment a b. */
+static double get_distance(const double a[static 3], const double b[static 3])
+{
+    double e[3];
+    double p[3];
+    for (int k = 0; k < 3; k++)
+        e[k] = b[k] - a[k];
+    double square = dot(e, e);
+    double t = square > 0 ? fmin(fmax(-dot(a, e) / square, 0), 1) : 0;
+    for (int k = 0; k < 3; k++)
+        p[k] = a[k] + t * e[k];
+    return sqrt(dot(p, p));
+}
+
+/** How far from its plane the edge may be met; see struct outline. length: |a| |b|. */
+static float get_width(const double a[static 3], const double b[static 3], double ends,
+                       double length, double slack)
+{
+    double width = ROUNDING * ends * ends / length;
+    if (slack > 0) {
+        double distance = get_distance(a, b);
+        width += distance > 2 * slack ? 2 * slack / distance : 1;
+    }
+    return (float)fmin(width, 1); // of all unit directions; also where the length is 0
 }
 
 int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster *cluster,
                            const float org[static 3], float margin, struct outline *out)
 {
+    double slack = (double)cluster->slack;
     int n = 0;
     for (int i = 0; i < cluster->n_edges; i++) {
         const struct edge *edge = &clusters->edges[cluster->first_edge + i];
@@ -161,13 +196,15 @@ int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster
         get_vertex(clusters, edge->ends[1], org, b);
         const double plane[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
                                  a[0] * b[1] - a[1] * b[0]};
-        if (edge->has_two && get_side(clusters, plane, edge->apex[0], org) *
-                                     get_side(clusters, plane, edge->apex[1], org) <
+        double ends = sqrt(dot(a, a)) + sqrt(dot(b, b));
+        if (edge->has_two && get_side(clusters, plane, ends, slack, edge->apex[0], org) *
+                                     get_side(clusters, plane, ends, slack, edge->apex[1], org) <
                                  0)
             continue;
         // Not to unit length: where the point is nearly in line with the edge, all is near it.
         double length = sqrt(dot(a, a) * dot(b, b));
         struct outline *outline = &out[n++];
+        outline->width = get_width(a, b, ends, length, slack);
         for (int k = 0; k < 3; k++) {
             outline->plane[k] = length > 0 ? (float)(plane[k] / length) : 0;
             outline->box.min[k] = (float)fmin(a[k], b[k]) - margin;

@@ -175,7 +175,8 @@ struct edge {
 /** An edge that bounds what is seen from a point. */
 struct outline {
     struct box box; // relative to the point, widened
-    float plane[3]; // normal to both ends' directions
+    float plane[3]; // normal to both ends' directions, at most of unit length
+    float width;    // unit directions d that may meet it have |plane . d| up to this
 };
 
 /** Where in 16 groups of directions it may change whether a ray is stopped. */
