@@ -14,6 +14,8 @@
 
 // Meshes a scene may hold; geometry ids are indices of gn_rt.meshes.
 #define MAX_MESHES (1 << 20)
+// Length over width of triangles that are met in double.
+#define THIN 64.0
 
 /* One device for the process: its threads and its memory are shared by all scenes. */
 static struct {
@@ -236,6 +238,52 @@ static int check_addition(const struct gn_rt *rt, enum gn_rt_set set, const doub
     return check_matrix(m, out_error);
 }
 
+/** Twice a triangle's area, squared, and its longest side, squared. Exact for zero area: products
+ * of differences of floats. */
+static void measure(const float *vertices, const uint32_t index[static 3], double *out_area2,
+                    double *out_side2)
+{
+    const float *p[3];
+    double e[3][3]; // sides; e[2] = -(e[0] + e[1])
+    *out_area2 = *out_side2 = 0;
+    for (int i = 0; i < 3; i++)
+        p[i] = vertices + 3 * (size_t)index[i];
+    for (int i = 0; i < 3; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++) {
+            e[i][k] = (double)p[(i + 1) % 3][k] - p[i][k];
+            square += e[i][k] * e[i][k];
+        }
+        *out_side2 = fmax(*out_side2, square);
+    }
+    for (int k = 0; k < 3; k++) {
+        double n = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+        *out_area2 += n * n;
+    }
+}
+
+/** Copies triangles. One that has no area after the matrix and rounding is made a point, which no
+ * ray meets: it has no normal. True where one is thin. */
+static bool copy_triangles(const struct gn_mesh *mesh, const float *vertices, uint32_t *out)
+{
+    bool is_thin = false;
+    for (size_t i = 0; i < (size_t)mesh->n_triangles; i++) {
+        uint32_t *index = out + 3 * i;
+        double area2;
+        double side2;
+        for (int k = 0; k < 3; k++) {
+            index[k] = mesh->triangles[3 * i + (size_t)k];
+            assert(index[k] < (uint32_t)mesh->n_vertices);
+        }
+        measure(vertices, index, &area2, &side2);
+        if (area2 > 0)
+            is_thin |= area2 * (THIN * THIN) < side2 * side2;
+        else
+            index[1] = index[2] = index[0];
+    }
+    return is_thin;
+}
+
 /** Embree's copy of a mesh after the matrix, committed; *out_geometry is the caller's. */
 static int make_geometry(struct gn_rt *rt, uint32_t object, const struct gn_mesh *mesh,
                          const double m[static 16], RTCGeometry *out_geometry,
@@ -262,10 +310,7 @@ static int make_geometry(struct gn_rt *rt, uint32_t object, const struct gn_mesh
     ret = transform_vertices(mesh, m, vertices, &bounds, out_error);
     if (ret < 0)
         goto out;
-    for (size_t i = 0; i < 3 * (size_t)mesh->n_triangles; i++) {
-        assert(mesh->triangles[i] < (uint32_t)mesh->n_vertices);
-        triangles[i] = mesh->triangles[i];
-    }
+    bool is_thin = copy_triangles(mesh, vertices, triangles);
     rtcSetGeometryMask(geometry, 0xffffffffu);
     if (gn_mesh_has_cutouts(mesh))
         set_cutouts(geometry, mesh);
@@ -275,6 +320,7 @@ static int make_geometry(struct gn_rt *rt, uint32_t object, const struct gn_mesh
     *out_mesh = (struct rt_mesh){
         .object = object,
         .mirrored = get_determinant(m) < 0.0,
+        .is_thin = is_thin,
         .vertices = vertices,
         .triangles = triangles,
     };

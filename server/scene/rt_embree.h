@@ -31,6 +31,7 @@ struct rt_bounds {
 struct rt_mesh {
     uint32_t object;
     bool mirrored;             // the matrix turns the winding round
+    bool is_thin;              // some triangle is 64 times as long as wide, or more
     const float *vertices;     // [][3] m; world, a mover's: its own coordinates
     const uint32_t *triangles; // [][3]
 };

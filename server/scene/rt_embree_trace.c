@@ -112,6 +112,62 @@ static struct spot get_spot(const struct rt_mesh *mesh, uint32_t triangle)
     return spot;
 }
 
+static void cross(const double a[static 3], const double b[static 3], double out[static 3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+static double dot(const double a[static 3], const double b[static 3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** The ray in a mover's own coordinates. */
+static void to_own(const float m[static 12], double s[static 3], double d[static 3])
+{
+    const double world_s[3] = {s[0] - m[9], s[1] - m[10], s[2] - m[11]};
+    const double world_d[3] = {d[0], d[1], d[2]};
+    for (int k = 0; k < 3; k++) {
+        const double column[3] = {m[3 * k], m[3 * k + 1], m[3 * k + 2]};
+        s[k] = dot(column, world_s);
+        d[k] = dot(column, world_d);
+    }
+}
+
+/**
+ * Where the ray meets a triangle of a thin mesh, once more in double: in floats the tracer's u and
+ * v are off by 2^-24 of lengths over the triangle's width, centimetres along a needle of metres.
+ * What then lies outside is taken to the edge. Source: Moeller and Trumbore, "Fast, Minimum Storage
+ * Ray-Triangle Intersection", 1997.
+ */
+static void sharpen(const struct rt_mesh *mesh, const struct rt_stand *stand, uint32_t triangle,
+                    const float org[static 3], const float dir[static 3], float *t, float *u,
+                    float *v)
+{
+    const struct spot spot = get_spot(mesh, triangle);
+    double s[3] = {org[0], org[1], org[2]};
+    double d[3] = {dir[0], dir[1], dir[2]};
+    double p[3];
+    double q[3];
+    if (stand)
+        to_own(stand->world_from_own, s, d);
+    for (int k = 0; k < 3; k++)
+        s[k] -= spot.v0[k];
+    cross(d, spot.e2, p);
+    cross(s, spot.e1, q);
+    double determinant = dot(spot.e1, p);
+    double at[3] = {dot(spot.e2, q) / determinant, dot(s, p) / determinant,
+                    dot(d, q) / determinant};
+    if (!(at[0] > 0.0) || !isfinite(at[0]) || !isfinite(at[1]) || !isfinite(at[2]))
+        return; // edge on: as the tracer has it
+    at[1] = fmin(fmax(at[1], 0.0), 1.0);
+    at[2] = fmin(fmax(at[2], 0.0), 1.0 - at[1]);
+    *t = (float)at[0];
+    *u = (float)at[1];
+    *v = (float)at[2];
+}
+
 /** The point at barycentric u, v. */
 static inline void get_point(const struct spot *spot, float u, float v, double out[static 3])
 {
@@ -207,6 +263,10 @@ bool gn_rt_intersect(const struct gn_rt *rt, enum gn_rt_set set, const float org
         trace_intersect1(rt->moving[set - 1], &rayhit);
     if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return false;
+    const struct rt_mesh *mesh = get_mesh(rt, rayhit.hit.instID[0], rayhit.hit.geomID);
+    if (mesh->is_thin)
+        sharpen(mesh, get_stand(rt, rayhit.hit.instID[0]), rayhit.hit.primID, org, dir,
+                &rayhit.ray.tfar, &rayhit.hit.u, &rayhit.hit.v);
     make_hit(rt, rayhit.hit.instID[0], rayhit.hit.geomID, rayhit.hit.primID, rayhit.ray.tfar,
              rayhit.hit.u, rayhit.hit.v, out_hit);
     return true;
@@ -252,7 +312,13 @@ void gn_rt_intersect16(const struct gn_rt *rt, enum gn_rt_set set,
         if (packet->valid[i] == 0 || rayhit.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID)
             continue;
         out_hits->met |= 1u << i;
-        out_hits->object[i] = get_mesh(rt, out_hits->mover[i], out_hits->mesh[i])->object;
+        const struct rt_mesh *mesh = get_mesh(rt, out_hits->mover[i], out_hits->mesh[i]);
+        const float org[3] = {packet->org_x[i], packet->org_y[i], packet->org_z[i]};
+        const float dir[3] = {packet->dir_x[i], packet->dir_y[i], packet->dir_z[i]};
+        out_hits->object[i] = mesh->object;
+        if (mesh->is_thin)
+            sharpen(mesh, get_stand(rt, out_hits->mover[i]), out_hits->triangle[i], org, dir,
+                    &out_hits->distance[i], &out_hits->u[i], &out_hits->v[i]);
     }
 }
 
