@@ -379,6 +379,10 @@ static void test_what_is_refused(void **state)
     refuse(&stage, &options, "17 bounces");
     options = (struct gn_render_options){.n_lights = GN_LIGHTS_MAX + 1};
     refuse(&stage, &options, "4097 lights");
+    options = (struct gn_render_options){.estimate_parts = 17};
+    refuse(&stage, &options, "17 of the error's pixels");
+    options = (struct gn_render_options){.estimate_parts = 4, .estimate_part = 4};
+    refuse(&stage, &options, "part 4 of 4");
     options = (struct gn_render_options){.grid = 5};
     refuse(&stage, &options, "grid of 5");
     options = (struct gn_render_options){.paths_per_pixel = -1};

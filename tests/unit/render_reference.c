@@ -179,6 +179,24 @@ static void test_white_furnace(void **state)
     gn_test_stage_finish(&stage);
 }
 
+/** What frames say together that ask a part of the pixels each: all of them once. */
+static double estimate_in_parts(struct gn_test_stage *stage)
+{
+    struct gn_error_sums sums[GN_ERROR_PARTS];
+    int n = 0, n_whole = stage->report.error.n;
+    for (int i = 0; i < GN_ERROR_PARTS; i++) {
+        gn_test_stage_render(stage, &(struct gn_render_options){.single_ray = true,
+                                                                .estimate_error = true,
+                                                                .estimate_parts = GN_ERROR_PARTS,
+                                                                .estimate_part = i});
+        sums[i] = stage->report.error;
+        n += sums[i].n;
+    }
+    // Which pixels are affected is found by directions of each part's own.
+    assert_in_range(n, n_whole - n_whole / 10, n_whole + n_whole / 10);
+    return gn_error_sums_get(sums, GN_ERROR_PARTS);
+}
+
 static void test_many_lights_tend_to_the_reference(void **state)
 {
     (void)state;
@@ -210,6 +228,9 @@ static void test_many_lights_tend_to_the_reference(void **state)
                       stage.report.n_lights, rms[i], n, stage.report.estimated_error);
         assert_true(stage.report.estimated_error > rms[i] / 1.5);
         assert_true(stage.report.estimated_error < rms[i] * 1.5);
+        double in_parts = estimate_in_parts(&stage);
+        print_message("# in %d parts %.4f\n", GN_ERROR_PARTS, in_parts);
+        assert_true(in_parts > rms[i] / 1.5 && in_parts < rms[i] * 1.5);
     }
     assert_true(rms[1] < 0.02 && 2 * rms[1] < rms[0]);
     gn_layers_finish(&reference);
