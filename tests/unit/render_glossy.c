@@ -199,6 +199,7 @@ static void test_without_gloss_nothing_of_it_runs(void **state)
                       grey);
     gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_plane(4, 1), 0, 0, -0.3, GN_MATERIAL_GGX,
                       grey);
+    stage.objects[1].material.roughness = 0.3f; // no mirror
     gn_test_stage_commit(&stage, 0);
     const struct gn_render_options options = {0};
     gn_render_get_needs(stage.scene, &options, &needs);
