@@ -37,6 +37,8 @@ enum { SPREAD_LEAST = 8 };
 /** Share of its weight that a point keeps with each new one. */
 #define KEEP_TIMES 0.95
 #define KEEP_ERRORS 0.7
+/** Frames for which is remembered what a setting took. */
+enum { REMEMBERED = 600 };
 /** Weight of what is known beforehand beside all points together. */
 #define TIME_PRIOR 0.01
 #define ERROR_PRIOR 0.5
@@ -152,6 +154,34 @@ static double predict_shape(const struct gn_budget *b, const struct gn_budget_se
            (double)n_pixels * get_time(&b->rest, 1, 0);
 }
 
+/** Place of a number of lights among 4, 6, 8, 11, ... */
+static int find_count(int n_lights)
+{
+    int i = n_lights > 0 ? (int)lrint(2 * log2(n_lights / 4.0)) + 4 : 0;
+    return i < 0 ? 0 : i < GN_BUDGET_COUNTS ? i : GN_BUDGET_COUNTS - 1;
+}
+
+/** What the setting takes, between what is remembered of those of less and of more work. */
+static double predict_ms(const struct gn_budget *b, const struct gn_budget_setting *s,
+                         int64_t n_pixels)
+{
+    int count = find_count(s->n_lights), step = find_step(s->shadow_step);
+    double least = 0, most = INFINITY, unit = b->load * (double)n_pixels;
+    for (int i = 0; i < GN_BUDGET_COUNTS * 9; i++) {
+        int c = i / 9, g = i / 3 % 3, t = i % 3;
+        const struct gn_budget_memory *m = &b->memory[c][g][t];
+        if (!(m->ms > 0) || b->n_frames - m->frame > REMEMBERED)
+            continue;
+        if (c == count && g == s->grid - 1 && t == step)
+            return m->ms * unit;
+        if (c <= count && g <= s->grid - 1 && t >= step)
+            least = fmax(least, m->ms * unit);
+        else if (c >= count && g >= s->grid - 1 && t <= step)
+            most = fmin(most, m->ms * unit);
+    }
+    return fmax(fmin(predict_shape(b, s, n_pixels), most), least);
+}
+
 /** Without the lights' part. */
 static double get_other_error2(const struct gn_budget_setting *s)
 {
@@ -230,7 +260,7 @@ static bool find_best(const struct gn_budget *b, const struct gn_budget_frame *f
     for (int n = get_least_lights(frame);; n = get_next_count(n, frame->n_lights)) {
         for (int i = 0; i < 9 && steps[i / 3] <= frame->max_step; i++) {
             struct rung r = {.setting = {n, 1 + i % 3, steps[i / 3]}};
-            r.ms = predict_shape(b, &r.setting, frame->n_pixels);
+            r.ms = predict_ms(b, &r.setting, frame->n_pixels);
             r.error = predict_error(b, &r.setting);
             if (r.ms < fastest.ms)
                 fastest = r;
@@ -256,7 +286,7 @@ static struct rung get_current(const struct gn_budget *b, const struct gn_budget
         r.setting.n_lights = frame->n_lights;
     if (r.setting.shadow_step > frame->max_step)
         r.setting.shadow_step = 1;
-    r.ms = predict_shape(b, &r.setting, frame->n_pixels);
+    r.ms = predict_ms(b, &r.setting, frame->n_pixels);
     r.error = predict_error(b, &r.setting);
     return r;
 }
@@ -318,6 +348,10 @@ static bool decide(struct gn_budget *b, const struct rung *current, const struct
     }
     bool is_early = b->n_frames < CLIMBING;
     bool has_room = best->ms * b->factor * margin < 0.5 * frame->budget_ms;
+    // What the last frames took may be a load that goes or comes.
+    double level = get_level(b, 3) / get_level(b, LEVEL);
+    if (level > MOVED || level * MOVED < 1)
+        return false;
     if (!(best->error <= (has_room ? 1 : WORTH) * current->error) ||
         (!is_early && b->rested < b->wait))
         return false;
@@ -424,9 +458,26 @@ static void learn_error(struct gn_budget *b, double estimated, int n_lights)
     add_point(&b->error, KEEP_ERRORS, log(n_lights), log(light));
 }
 
+/** The setting's time without the level. The first frame in new light is not like the others. */
+static void remember(struct gn_budget *b, const struct gn_budget_outcome *o, double ms)
+{
+    const struct gn_budget_setting *s = &b->setting;
+    struct gn_budget_memory *m =
+        &b->memory[find_count(get_lights(b, o))][s->grid - 1][find_step(s->shadow_step)];
+    double unit = ms / (b->load * (double)b->frame.n_pixels);
+    bool is_usual = unit < 1.5 * m->ms && m->ms < 1.5 * unit;
+    if (!(m->ms > 0) || b->n_frames - m->frame > REMEMBERED)
+        m->ms = unit;
+    else if (b->rested <= NEW || is_usual)
+        m->ms += (unit - m->ms) * (b->rested <= NEW ? 0.5 : 0.1);
+    m->frame = b->n_frames;
+}
+
 /** What surprises after a change of setting says what that takes; later, what the load is. */
 static void learn_time(struct gn_budget *b, const struct gn_budget_outcome *o, double ms)
 {
+    double level = b->rested <= NEW ? b->factor : get_level(b, LEVEL);
+    remember(b, o, ms / level);
     if (b->rested <= NEW || !(b->shape_ms > 0)) {
         learn_shape(b, o);
         return;
@@ -434,7 +485,7 @@ static void learn_time(struct gn_budget *b, const struct gn_budget_outcome *o, d
     double ratio = ms / b->shape_ms;
     keep_level(b, ratio);
     keep_spread(b, ratio / b->factor);
-    double level = get_level(b, 3);
+    level = get_level(b, 3);
     // What stands out is not how the passes are.
     if (ratio < 1.5 * level && level < 1.5 * ratio)
         learn_shape(b, o);

@@ -6,8 +6,10 @@
  *
  * Time: each pass takes a + b N for each of its samples, N the lights, both learned from the
  * frames; what is common to all, the machine's load above all, is one factor, the median of the
- * last frames. Error: squares of independent parts add up: of the lights c N^-e, c and e learned
- * from the errors that were estimated; of the grid at edges and of the shadow's step.
+ * last frames. No line knows a jump, say of a lamp that comes in: what a setting took is remembered
+ * for a while, and bounds those of less and of more work. Error: squares of independent parts add
+ * up: of the lights c N^-e, c and e learned from the errors that were estimated; of the grid at
+ * edges and of the shadow's step.
  *
  * So that it does not swing: a setting is entered where its time fits with the margin that the last
  * frames' spread asks for, and left only where it is over that by more than a dead band, or where
@@ -68,6 +70,15 @@ struct gn_budget_line {
     double weight, x, y, xx, xy; // sums
 };
 
+/** Numbers of lights that times are remembered of. */
+#define GN_BUDGET_COUNTS 24
+
+/** What a setting took when it was used last. */
+struct gn_budget_memory {
+    double ms;      // for each pixel, at load 1; 0: not known
+    uint64_t frame; // when
+};
+
 /** Ratios of measured to predicted times that are kept. */
 #define GN_BUDGET_KEPT 64
 
@@ -77,6 +88,7 @@ struct gn_budget {
     struct gn_budget_setting setting;        // of the frame at hand, or the last one
     struct gn_budget_frame frame;
     struct gn_budget_line plan, primary, shade, shadow, rest;
+    struct gn_budget_memory memory[GN_BUDGET_COUNTS][3][3]; // by lights, grid, step
     double step_share[3];        // of the shadow pass at step 1, 2, 4; 0: not seen
     double refined_share;        // of pixels; < 0 or, where n_frames is 0, 0: not seen
     struct gn_budget_line error; // logarithms of the lights' part over those of N

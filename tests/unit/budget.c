@@ -16,6 +16,7 @@ struct world {
     double hiccups; // share of frames that take three times as long
     double object;  // share of samples that shading and shadow work on
     double error;   // of one light
+    double jump;    // factor on the shadow pass from 32 lights on; 0: none
     int n_lights;   // that there are
     int64_t n_pixels;
     double budget_ms;
@@ -47,6 +48,8 @@ static void get_outcome(const struct world *w, const struct gn_budget_setting *s
     o->ms_primary = 9e-6 * samples;
     o->ms_shade = w->object * samples * (2e-6 + 1.2e-6 * pow(s->n_lights, 0.9));
     o->ms_shadow = samples * step * (2e-6 + 0.3e-6 * pow(s->n_lights, 0.95));
+    if (w->jump > 0 && s->n_lights >= 32)
+        o->ms_shadow *= w->jump;
     o->n_refined_pixels = s->grid > 1 ? (int64_t)(share * (double)w->n_pixels) : 0;
     o->ms = o->ms_plan + o->ms_primary + o->ms_shade + o->ms_shadow + 6e-6 * (double)w->n_pixels;
     o->n_lights = 0;
@@ -149,6 +152,30 @@ static void test_noise_makes_no_swings(void **state)
             assert_true(switches <= 30);
             assert_true(misses <= 120);
         }
+    }
+}
+
+/** From one number of lights to the next a pass takes several times longer. */
+static void test_a_jump_is_not_tried_again_and_again(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof(budgets) / sizeof(budgets[0]); i++) {
+        struct world w = make_world(50 + i, budgets[i]);
+        w.noise = 0.04;
+        w.jump = 4;
+        for (int k = 0; k < 60; k++)
+            run_frame(&w);
+        uint64_t switches = w.budget.n_switches, misses = w.budget.n_misses;
+        for (int k = 0; k < 1000; k++)
+            run_frame(&w);
+        switches = w.budget.n_switches - switches;
+        misses = w.budget.n_misses - misses;
+        print_message("# %g ms, a jump at 32 lights: %d lights, grid %d; %d switches, %d misses of "
+                      "1000\n",
+                      budgets[i], w.choice.setting.n_lights, w.choice.setting.grid, (int)switches,
+                      (int)misses);
+        assert_true(switches <= 12);
+        assert_true(misses <= 100);
     }
 }
 
@@ -297,6 +324,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_quiet_machine_is_used_and_held),
         cmocka_unit_test(test_noise_makes_no_swings),
+        cmocka_unit_test(test_a_jump_is_not_tried_again_and_again),
         cmocka_unit_test(test_a_step_of_load_is_followed),
         cmocka_unit_test(test_an_object_that_comes_near_is_followed),
         cmocka_unit_test(test_one_late_frame_is_let_pass),
