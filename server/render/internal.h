@@ -227,6 +227,14 @@ struct feature {
     float color[3]; // its radiance, or the shadow factor
 };
 
+/** What coarse.c has to know of a pixel's centre. */
+enum spot_kind { SPOT_OTHER = 0, SPOT_KNOWN = 1, SPOT_WAITS = 2 };
+struct spot {
+    enum spot_kind kind; // a receiver whose shadow is known, one that waits for it, or neither
+    uint32_t object;
+    float point[3], normal[3]; // m, world; unit
+};
+
 /** Samples of a batch that distant light is summed for, in structure-of-arrays form and blocks of
  * LANES. */
 struct receivers {
@@ -349,6 +357,8 @@ struct frame {
     const struct pass *pass; // NULL: a frame by itself; else its samples go into the pass' sums
     struct gn_layers *layers;
     struct feature *features;     // [h][w], but of plain blocks
+    int shadow_step;              // 1: every pixel has its own shadow
+    struct spot *spots;           // [h][w], but of plain blocks; with a step of 1 not used
     bool *plain;                  // [tiles_y * BLOCKS][tiles_x * BLOCKS] such as nothing is lost in
     struct tile_figures *figures; // [n_tiles]
     struct scratch *scratches;    // [n_workers]
@@ -633,6 +643,15 @@ bool gn_refine_is_all_plain(const struct frame *frame, int x, int y);
 const struct feature *gn_refine_get_feature(const struct frame *frame, int x, int y);
 /** True where the pixel needs its quality's grid. */
 bool gn_refine_is_needed(const struct frame *frame, int x, int y);
+
+/* coarse.c */
+
+/** Keeps what is needed of a pixel's sample; true: its shadow waits, it is no receiver for now. */
+bool gn_coarse_put_off(const struct frame *frame, int x, int y, struct sample *sample);
+/** True where the pixel's shadow waits. */
+bool gn_coarse_waits(const struct frame *frame, int x, int y);
+/** The shadow of a pixel that waits, by those about it. False: it has to be worked out. */
+bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_factor[static 3]);
 
 /* layers.c */
 

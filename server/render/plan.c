@@ -234,6 +234,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
              "virtual mirrors or glass may throw light onto real ones");
     const char *no_optics = why_not_optics(frame);
     frame->run_optics = !no_optics;
+    bool is_coarse = options->shadow_step > 1 && frame->skips && frame->run_shadow &&
+                     !frame->run_optics && options->quality == GN_QUALITY_INTERACTIVE;
+    frame->shadow_step = is_coarse ? options->shadow_step : 1;
     set_line(report, OPTICS, no_optics, "a real mirror or glass may show virtual objects");
     set_line(report, BOUNCES, why_not_bounces(frame), "bounces were asked for");
     bool can_add = frame->run_bounces || frame->near.n_virtual > 0;

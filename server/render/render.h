@@ -31,6 +31,9 @@ enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE = 1 };
 /** Their names, as a list of choices in that order. */
 #define GN_SHADING_NAMES "lights|irradiance"
 
+/** Largest shadow_step. */
+#define GN_SHADOW_STEP_MAX 4
+
 /** All-zero is the default of the quality. */
 struct gn_render_options {
     enum gn_quality quality;
@@ -48,7 +51,10 @@ struct gn_render_options {
                   // merged (light_merge.h); default: all. Not of the reference
     int grid;     // rays per side of pixels that get a grid, [1, 4]; default: the quality's own.
                   // Not of seed, which has none
-    int bounces;  // reference only: indirect bounces, [0, 16]
+    int shadow_step; // interactive, of diffuse real surfaces without near light on them: only each
+                     // 2nd or 4th pixel of a row and column has its own shadow, those between a
+                     // mean where it is smooth (coarse.c); default: 1, every pixel
+    int bounces;     // reference only: indirect bounces, [0, 16]
     int paths_per_pixel; // reference with bounces: random paths, [1, 65536], default 256
     uint64_t seed;       // of the reference's random paths
 };

@@ -37,6 +37,7 @@ struct gn_renderer {
     float *rays;     // [h][w][3], owned
     struct feature *features;
     bool *plain; // [blocks], see struct frame
+    struct spot *spots;
     struct tile_figures *figures;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
     bool has_pass_rays;           // through other points than the centres
@@ -117,6 +118,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     free(self->rays);
     free(self->features);
     free(self->plain);
+    free(self->spots);
     free(self->figures);
     free(self);
 }
@@ -152,6 +154,8 @@ static int reserve_pixels(struct gn_renderer *renderer, int width, int height)
     free(renderer->rays);
     free(renderer->features);
     free(renderer->plain);
+    free(renderer->spots);
+    renderer->spots = NULL;
     free(renderer->figures);
     renderer->rays = malloc(3 * n * sizeof(*renderer->rays));
     renderer->features = calloc(n, sizeof(*renderer->features));
@@ -268,6 +272,9 @@ static int check_request(const struct gn_scene *scene, const struct gn_camera *c
     if (options->grid < 0 || options->grid > MAX_GRID)
         return gn_error_set(out_error, -EINVAL, "render: a grid of %d rays, must be 1 to %d",
                             options->grid, MAX_GRID);
+    if (options->shadow_step < 0 || options->shadow_step > GN_SHADOW_STEP_MAX || options->shadow_step == 3)
+        return gn_error_set(out_error, -EINVAL, "render: a shadow step of %d, must be 1, 2 or 4",
+                            options->shadow_step);
     if (options->bounces < 0 || options->bounces > MAX_BOUNCES)
         return gn_error_set(out_error, -EINVAL, "render: %d bounces, must be 0 to %d",
                             options->bounces, MAX_BOUNCES);
@@ -355,6 +362,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
     frame->places = get_places(renderer, frame);
     frame->features = renderer->features;
     frame->plain = renderer->plain;
+    frame->spots = renderer->spots;
     frame->figures = renderer->figures;
     frame->scratches = renderer->scratches;
     frame->tiles_x = count_tiles(frame->camera->width);
@@ -410,6 +418,11 @@ static int prepare(struct gn_renderer *renderer, const struct frame *frame,
                                 camera->width, camera->height);
     }
     ret = reserve_pixels(renderer, camera->width, camera->height);
+    if (ret == 0 && frame->options.shadow_step > 1 && !renderer->spots) {
+        size_t n = (size_t)camera->width * (size_t)camera->height;
+        renderer->spots = calloc(n, sizeof(*renderer->spots));
+        ret = renderer->spots ? 0 : -ENOMEM;
+    }
     if (ret == 0)
         ret = gn_places_reserve(&renderer->places, 0);
     if (ret == 0 && !frame->pass)

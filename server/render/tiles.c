@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * A frame in tiles on the pool. Two rounds with a wait between them: all centres, then the pixels
- * whose neighbourhood asks for more.
+ * A frame in tiles on the pool. Rounds with a wait between them: all centres; the shadow between
+ * those that have it, where it is coarser than the picture; then the pixels whose neighbourhood
+ * asks for more.
  */
 #include "server/render/internal.h"
 
@@ -64,11 +65,15 @@ static double get_factor(const struct frame *frame, const struct sample *s, int 
     return s->open[k] > frame->floor_irradiance[k] ? 1 - s->cut[k] / s->open[k] : 1;
 }
 
+static struct feature *get_feature(const struct frame *frame, int x, int y)
+{
+    return &frame->features[(size_t)y * (size_t)frame->camera->width + (size_t)x];
+}
+
 /** What the choice of pixels to refine looks at; without bounces, which are noisy. */
 static void keep_feature(const struct frame *frame, int x, int y, const struct sample *s)
 {
-    struct feature *feature =
-        &frame->features[(size_t)y * (size_t)frame->camera->width + (size_t)x];
+    struct feature *feature = get_feature(frame, x, y);
     bool is_virtual = s->kind == SAMPLE_VIRTUAL;
     bool is_shown = !is_virtual && s->shown != 0; // in a mirror
     feature->owner = is_virtual ? s->object + 1
@@ -172,6 +177,8 @@ static void render_centres(void *context, int item, int worker)
     int64_t start = gn_clock_get_monotonic_ns();
     int n = see_tile(frame, scratch, item, pixels, figures);
     figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
+    for (int i = 0; i < n && frame->shadow_step > 1; i++)
+        gn_coarse_put_off(frame, pixels[i][0], pixels[i][1], &scratch->samples[i]);
     if (n > 0)
         process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
     for (int i = 0; i < n; i++) {
@@ -186,6 +193,54 @@ static void render_centres(void *context, int item, int worker)
         gn_layers_resolve(frame, x, y, s, 1);
         keep_feature(frame, x, y, s);
     }
+}
+
+/** Works out the shadow of pixels[n][2] that waited. */
+static void see_again(const struct frame *frame, struct scratch *scratch, int (*pixels)[2], int n,
+                      struct tile_figures *figures)
+{
+    for (int i = 0; i < n; i++) {
+        struct sample *s = &scratch->samples[i];
+        int x = pixels[i][0];
+        int y = pixels[i][1];
+        s->group = i;
+        init_sample(frame, s, x, y, 0);
+        gn_primary_aim(frame,
+                       frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
+    }
+    gn_primary_trace(frame, scratch->samples, n, figures);
+    process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
+    for (int i = 0; i < n; i++) {
+        gn_layers_resolve(frame, pixels[i][0], pixels[i][1], &scratch->samples[i], 1);
+        keep_feature(frame, pixels[i][0], pixels[i][1], &scratch->samples[i]);
+    }
+}
+
+/** Between the pixels whose shadow is known. */
+static void render_between(void *context, int item, int worker)
+{
+    const struct frame *frame = context;
+    int again[BATCH][2];
+    int n = 0;
+    for (int i = 0; i < BATCH; i++) {
+        int x;
+        int y;
+        float factor[3];
+        get_corner(frame, item, i / LANES, &x, &y);
+        x += i % BLOCK;
+        y += i % LANES / BLOCK;
+        if (!gn_coarse_waits(frame, x, y))
+            continue;
+        if (!gn_coarse_interpolate(frame, x, y, factor)) {
+            again[n][0] = x;
+            again[n++][1] = y;
+            continue;
+        }
+        memcpy(gn_image_at(&frame->layers->shadow, x, y), factor, sizeof(factor));
+        memcpy(get_feature(frame, x, y)->color, factor, sizeof(factor));
+    }
+    if (n > 0)
+        see_again(frame, &frame->scratches[worker], again, n, &frame->figures[item]);
 }
 
 /** Does pixels[n][2] again with the grid. */
@@ -277,6 +332,8 @@ void gn_tiles_render(struct frame *frame, struct gn_pool *pool)
 {
     int n_tiles = frame->tiles_x * frame->tiles_y;
     gn_pool_run(pool, n_tiles, render_centres, frame);
+    if (frame->shadow_step > 1)
+        gn_pool_run(pool, n_tiles, render_between, frame);
     if (!frame->pass)
         gn_pool_run(pool, n_tiles, render_edges, frame);
 }

@@ -65,6 +65,7 @@ int gn_cli_render_within(const struct gn_cli_request *request, const struct gn_c
         .budget_ms = request->budget_ms,
         .n_pixels = (int64_t)scene->camera->width * scene->camera->height,
         .n_lights = is_free ? budget.n_lights * n_probes : budget.n_lights,
+        .max_step = GN_SHADOW_STEP_MAX,
     };
     for (int held = 0; budget.n_frames < MOST && (budget.n_frames < LEAST || held < HOLD);) {
         uint64_t n_switches = controller.n_switches;
@@ -77,6 +78,7 @@ int gn_cli_render_within(const struct gn_cli_request *request, const struct gn_c
         struct gn_render_options options = request->render;
         options.n_lights = is_free ? 0 : setting->n_lights;
         options.grid = setting->grid;
+        options.shadow_step = setting->shadow_step;
         if (ret == 0)
             ret = gn_renderer_render(scene->renderer, scene->camera, *light, &options, layers,
                                      out_report, out_error);

@@ -76,7 +76,8 @@ void gn_pace_begin(struct gn_paces *paces, const struct gn_room_options *options
                    struct gn_pace_turn *out)
 {
     const struct gn_msg_frame *frame = &job->frame;
-    struct gn_budget_frame known = {.budget_ms = options->budget_ms};
+    struct gn_budget_frame known = {.budget_ms = options->budget_ms,
+                                    .max_step = GN_SHADOW_STEP_MAX};
     int n_lights;
     *out = (struct gn_pace_turn){.pace = get_pace(paces, job->answer->session_id)};
     if (frame->budget_ms > 0 && (!(known.budget_ms > 0) || frame->budget_ms < known.budget_ms))
@@ -100,6 +101,7 @@ void gn_pace_set_options(const struct gn_pace_turn *turn, struct gn_render_optio
     int n = turn->choice.setting.n_lights + turn->choice.setting.n_lights / 4;
     options->n_lights = n < GN_LIGHTS_MAX ? n : GN_LIGHTS_MAX;
     options->grid = turn->choice.setting.grid;
+    options->shadow_step = turn->choice.setting.shadow_step;
     options->estimate_error = true;
     options->estimate_parts = GN_ERROR_PARTS;
     options->estimate_part = turn->part;
