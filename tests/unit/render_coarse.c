@@ -12,7 +12,7 @@
 #include "tests/meshes.h"
 #include "tests/stage.h"
 
-enum { WIDTH = 80, HEIGHT = 60, N_LIGHTS = 64 };
+enum { WIDTH = 80, HEIGHT = 60, N_LIGHTS = 64, SUN = 20 };
 
 static const float grey[3] = {0.5f, 0.5f, 0.5f};
 
@@ -23,7 +23,8 @@ static void paint_white(void *context, const double dir[static 3], float out_rgb
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 1;
 }
 
-/** A ball over a floor under an even sky, whose shadow is soft; and a box, real, beside it. */
+/** A ball over a floor under an even sky and one strong light, whose shadow has an edge; and a box,
+ * real, beside it. */
 static void init_stage(struct gn_test_stage *stage, int n_threads)
 {
     const double eye[3] = {4, -1, 3};
@@ -44,7 +45,7 @@ static void init_stage(struct gn_test_stage *stage, int n_threads)
         lights[i].dir_world[1] = (float)(sqrt(1 - z * z) * sin(phi));
         lights[i].dir_world[2] = (float)z;
         for (int k = 0; k < 3; k++)
-            lights[i].irradiance[k] = (float)(1 + k);
+            lights[i].irradiance[k] = (float)(1 + k) * (i == SUN ? 30.0f : 1.0f);
     }
     gn_test_stage_set_lights(stage, lights, N_LIGHTS);
     gn_test_stage_aim(stage, WIDTH, HEIGHT, 90, eye, target);
