@@ -10,9 +10,9 @@
 #ifndef GN_SERVER_RENDER_INTERNAL_H
 #define GN_SERVER_RENDER_INTERNAL_H
 
-#include "server/light/blend.h"
 #include "server/render/kernels/kernels.h"
 #include "server/render/light_merge.h"
+#include "server/render/lights.h"
 #include "server/render/near.h"
 #include "server/render/render.h"
 
@@ -24,22 +24,10 @@
 #define BLOCK 4
 /** Mirrors a ray may meet one after another; after that it takes the map's radiance. */
 #define MIRROR_DEPTH 8
-/** Receivers of a block, neighbours in the picture: as many as a packet's rays. */
-#define LANES GN_RT_PACKET
 /** Blocks of a tile's side. */
 #define BLOCKS (TILE / BLOCK)
-/** Boxes that real geometry is put in for conservative tests. */
-#define MAX_BLOCKERS 64
-/** Clusters of a set's triangles. */
-#define MAX_CLUSTERS 64
-/** Most triangles of a cluster that keeps its vertices and edges. */
-#define CLUSTER_TRIANGLES 64
-/** Most outlines of both sets. */
-#define MAX_OUTLINES (2 * MAX_CLUSTERS * CLUSTER_TRIANGLES * 3)
 /** Bits of 1 << material: what is seen through or in them, not on them. */
 #define CLEAR_MATERIALS (1u << GN_MATERIAL_MIRROR | 1u << GN_MATERIAL_GLASS)
-/** Directions of a group: 16 blocks of 16. */
-#define GROUP (LANES * LANES)
 
 struct optics;
 struct pass;
@@ -86,132 +74,6 @@ struct sight {
     float dir_z[LANES];  // their components along the camera's z
     bool has_ray[LANES]; // false: outside the picture, or the camera has no ray there
     struct gn_rt_packet_hits hits;
-};
-
-/** A box for conservative tests, m; or of directions. */
-struct box {
-    float min[3], max[3];
-};
-
-/** 16 blocks of 16 lights each, all near each other. */
-struct light_group {
-    struct direction_boxes blocks;
-    uint16_t lit[LANES];              // per block, bit i: lane i has light
-    double block_moment[LANES][3][3]; // per block and channel: sum of irradiance times direction
-    double moment[3][3];              // of the group
-};
-
-/** Directions that carry light, in structure-of-arrays form; the reference's in groups, filled up
- * with dark ones. */
-struct light_list {
-    int n, capacity;
-    int n_lit;               // without the dark ones
-    int ends[GN_PROBES_MAX]; // of each probe's lights, which begin where the one's before end
-    float *dir[3];           // unit, world
-    float *irradiance[3];    // at normal incidence, W/m^2
-    double total[3];         // sum of irradiance
-    double *cdf;             // [n] of luminance, rising to 1; the reference's choice of lights
-    int n_groups;            // reference only: n / GROUP
-    struct light_group *groups;
-    struct direction_boxes *group_boxes; // of the groups, 16 together
-};
-
-/** A piece of a modelled real surface that the probe sees (places.c). */
-struct place {
-    float position[3];  // m, world
-    float normal[3];    // unit, to the probe's side
-    float intensity[3]; // W/sr along the normal
-    float radius2;      // m^2, of the disc of equal area
-};
-
-/** What the reference's covered texels are in the global model. */
-struct places {
-    int n;
-    int64_t capacity;
-    int ends[GN_PROBES_MAX]; // of each probe's
-    struct place *lights;    // [n], owned
-    double *cdf;             // [n] of luminance, rising to 1; for walks
-};
-
-/** Some triangles that are near each other. */
-struct cluster {
-    struct box box;               // exact but for slack
-    int first_vertex, n_vertices; // three for each triangle; of many triangles: the box's corners
-    bool has_edges;               // false: of too many triangles, or of several that move
-    bool is_flat;                 // of one object, which lies in one plane
-    int first_edge, n_edges;
-    int first_corner, n_corners; // in the clusters' corners: each vertex's place once
-    int mover;                   // of whose triangles it is; CLUSTER_RESTS, CLUSTER_MIXED
-    float slack; // m, by which rounding may put what is traced elsewhere; 0 where all rests
-};
-
-/** All of it rests. */
-#define CLUSTER_RESTS (-1)
-/** Several objects, of which some move: a box about them. */
-#define CLUSTER_MIXED (-2)
-
-/** A movable object. */
-struct mover {
-    int object;
-    int group;      // the box it shares with others; -1: none
-    struct box own; // of its vertices, mesh coordinates
-};
-
-/** Movable objects of a role and the boxes that they share with others. */
-struct movers {
-    int n;
-    struct mover *mover;              // [n], owned
-    struct box resting[MAX_CLUSTERS]; // by group: of what rests in it; min > max: nothing
-};
-
-/** An edge and what its triangles have beside it: indices of the clusters' vertices. */
-struct edge {
-    int ends[2];
-    int apex[2];
-    bool has_two; // triangles; else one, or more than two, and apex says nothing
-    int cluster;
-};
-
-/** An edge that bounds what is seen from a point. */
-struct outline {
-    struct box box; // relative to the point, widened
-    float plane[3]; // normal to both ends' directions, at most of unit length
-    float width;    // unit directions d that may meet it have |plane . d| up to this
-};
-
-/** Where in 16 groups of directions it may change whether a ray is stopped. */
-struct change {
-    const struct outline *outline; // NULL: anywhere in the box
-    const struct box *box;
-    unsigned groups;
-};
-
-/** A cluster as a point sees it. */
-struct seen_cluster {
-    struct box box; // relative to the point, widened
-    bool has_outlines;
-    int first_outline, n_outlines;
-};
-
-/** A set's triangles, each in one cluster. */
-struct clusters {
-    enum gn_rt_set role;
-    int n;
-    struct cluster cluster[MAX_CLUSTERS];
-    int n_vertices;
-    float *vertices[3];         // world, owned
-    float *own_vertices[3];     // of movers': mesh coordinates, owned; NULL where nothing moves
-    bool is_flat[MAX_CLUSTERS]; // of the objects' first clusters, which are also the blockers
-    uint16_t *corners;          // indices of vertices, owned
-    struct edge *edges;         // owned; an edge of triangles of two clusters is in one of them
-    struct movers movers;
-};
-
-/** Boxes of the real objects, each in one. */
-struct blockers {
-    int n;
-    struct box boxes[MAX_BLOCKERS]; // exact; of what moves, widened by its slack
-    struct movers movers;           // group: index of the box
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -510,103 +372,6 @@ void gn_occlusion_find_hidden(const struct frame *frame, struct scratch *scratch
 /** Marks in hidden what any object hides from all receivers. */
 void gn_occlusion_find_all(const struct frame *frame, struct scratch *scratch, uint64_t *rays);
 
-/* blockers.c */
-
-/** Returns 0 or -ENOMEM. */
-GN_MUST_USE int gn_blockers_make(const struct gn_scene *scene, struct blockers *out);
-void gn_blockers_finish(struct blockers *blockers);
-/** Follows the movable objects to where they stand in a snapshot of the scene. */
-void gn_blockers_pose(struct blockers *blockers, const struct gn_scene *scene);
-/** Those of the frame's (widened) that do not lie wholly under the planes through all wanted
- * receivers' ray origins: no ray that leaves upwards meets the others. Returns their number. */
-int gn_blockers_list_above(const struct frame *frame, const struct receivers *receivers,
-                           const struct box *out_boxes[static MAX_BLOCKERS]);
-
-/* movers.c */
-
-#define EMPTY_BOX ((struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}})
-
-/** Lists the movable objects of a role; all groups are -1 and empty. Returns 0 or -ENOMEM. */
-GN_MUST_USE int gn_movers_make(const struct gn_scene *scene, enum gn_rt_set role,
-                               struct movers *out);
-void gn_movers_finish(struct movers *movers);
-/** Index of the object's mover; -1: it rests. */
-int gn_movers_find(const struct movers *movers, int object);
-/** World vertex of a mesh, rounded as rt rounds it. */
-void gn_movers_get_vertex(const struct gn_scene_object *object, const float p[static 3],
-                          float out[static 3]);
-/** Grows box by the world box of a mover where it stands in the scene, and returns its slack. */
-float gn_movers_grow_box(const struct mover *mover, const struct gn_scene *scene, struct box *box);
-void gn_box_grow(struct box *box, const float p[static 3]);
-
-/* clusters.c */
-
-/** Makes the clusters of the scene's objects of a role. Returns 0 or -ENOMEM. */
-GN_MUST_USE int gn_clusters_make(const struct gn_scene *scene, enum gn_rt_set role,
-                                 struct clusters *out);
-void gn_clusters_finish(struct clusters *clusters);
-/** Follows the movable objects to where they stand in a snapshot of the scene; O(clusters). */
-void gn_clusters_pose(struct clusters *clusters, const struct gn_scene *scene);
-/** Adds to out[n] and their outlines the clusters that are not wholly in or under the plane through
- * org: no ray that leaves upwards meets the others. Returns the new n. */
-int gn_clusters_list_above(const struct clusters *clusters, const float org[static 3],
-                           const float normal[static 3], float margin, int n,
-                           struct seen_cluster *out, struct outline *outlines);
-
-/* edges.c */
-
-/** Fills the edges of the clusters that have them. Returns 0 or -ENOMEM. */
-GN_MUST_USE int gn_edges_make(struct clusters *clusters);
-/** Those of a cluster's edges that bound what is seen from org. Returns their number. */
-int gn_edges_list_outlines(const struct clusters *clusters, const struct cluster *cluster,
-                           const float org[static 3], float margin, struct outline *out);
-
-/* directions.c */
-
-/** Makes the groups of a list whose lights are in their order. */
-void gn_directions_fill_groups(struct light_list *list);
-/** Sets one of 16; box may be empty (min > max). */
-void gn_directions_set_box(struct direction_boxes *boxes, int lane, const struct box *box);
-/** Bit i: unless all rays from the origin with a direction of box i surely miss `box`. */
-unsigned gn_directions_meet(const struct direction_boxes *boxes, const struct box *box);
-/** Bit i: unless the outline surely crosses no direction of box i. */
-unsigned gn_directions_cross(const struct direction_boxes *boxes, const struct outline *outline);
-/** Bit i: box i may hold a direction above the plane across n; surely holds no other. */
-void gn_directions_split(const struct direction_boxes *boxes, const float n[static 3],
-                         unsigned *out_some, unsigned *out_all);
-
-/* reference_lights.c */
-
-/** Fills list from the whole map of each probe: every texel, bright ones in parts, and what it does
- * not show. No 16 groups are of two probes. */
-GN_MUST_USE int gn_reference_make_lights(const struct gn_blend *blend, struct light_list *list,
-                                         struct places *places);
-
-/* places.c */
-
-/** Empties the list. Returns 0 or -ENOMEM. */
-GN_MUST_USE int gn_places_reserve(struct places *places, int64_t capacity);
-void gn_places_finish(struct places *places);
-/** Adds what the map's probe sees in a unit direction, of irradiance across it. False: it sees no
- * modelled surface there; nothing is added. */
-bool gn_places_add(struct places *places, const struct gn_radiance_map *map,
-                   const double dir[static 3], double solid_angle,
-                   const double irradiance[static 3]);
-/** After the last: fills cdf. */
-void gn_places_fill_cdf(struct places *places);
-/** Irradiance of a surface by one place, chosen by `random` [0, 1), over its probability. */
-void gn_places_try(const struct frame *frame, const struct gn_surface *surface,
-                   const float org[static 3], enum gn_rt_set set, double random,
-                   double out_irradiance[static 3], uint64_t *rays);
-/** Marks those that the set hides from the sample. True where there is one. */
-bool gn_places_find_hidden(const struct frame *frame, struct scratch *scratch,
-                           const struct sample *s, enum gn_rt_set set, uint8_t *hidden,
-                           uint64_t *rays);
-/** Adds what those send that hidden does not mark to sums[0], and of that what cut marks to
- * sums[1]; even: without the surface's cosine. */
-void gn_places_sum(const struct frame *frame, const struct sample *s, const uint8_t *hidden,
-                   const uint8_t *cut, bool even, double sums[static 2][3]);
-
 /* reference.c */
 
 /** As gn_shade_samples and gn_shadow_samples, by every direction of the map, with bounces. */
@@ -662,24 +427,6 @@ void gn_layers_write_plain(const struct frame *frame, int x, int y,
 void gn_layers_resolve(const struct frame *frame, int x, int y, const struct sample *samples,
                        int n);
 
-/* light_list.c */
-
-GN_MUST_USE int gn_render_lights_reserve(struct light_list *list, int64_t capacity);
-void gn_render_lights_finish(struct light_list *list);
-void gn_render_lights_add(struct light_list *list, const double dir[static 3],
-                          const double irradiance[static 3]);
-/** Adds dark lights up to the next multiple. */
-void gn_render_lights_pad(struct light_list *list, int multiple);
-/** Fills list from the states' lights; dark ones are left out. Of more than `limit` together (0:
- * GN_LIGHTS_MAX) each probe has its share, merged from all its lights. */
-GN_MUST_USE int gn_render_lights_from_blend(const struct gn_blend *blend, int limit,
-                                            struct light_merge *merge, struct light_list *list,
-                                            struct placed_lights *placed);
-/** The light that u in [0, 1) chooses by luminance, where cdf is filled and some light is lit. */
-int gn_render_lights_choose(const struct light_list *list, double u);
-/** Sets the weights of samples that see a surface. */
-void gn_render_weigh_probes(const struct frame *frame, struct sample *samples, int n);
-
 /* packet.c: rays into packets of 16 */
 
 /** Adds a ray of that length (INFINITY: to a distant light); true where the packet is now full and
@@ -690,40 +437,9 @@ bool gn_packet_add(struct scratch *scratch, const float org[static 3], const flo
 uint32_t gn_packet_trace(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
                          int *out_n, uint64_t *rays);
 
-/** True unless the ray surely misses the box. */
-bool gn_box_may_meet(const struct box *box, const float org[static 3], const float dir[static 3]);
-/** True unless all rays of direction dir from points of `from` surely miss `box`. */
-bool gn_box_may_meet_from_box(const struct box *box, const struct box *from,
-                              const float dir[static 3]);
-
 static inline float dot3(const float a[static 3], const float b[static 3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static inline void gn_render_lights_get_dir(const struct light_list *lights, int l,
-                                            float out_dir[static 3])
-{
-    for (int k = 0; k < 3; k++)
-        out_dir[k] = lights->dir[k][l];
-}
-
-/** As fminf and fmaxf, which are calls. */
-static inline void grow_box(struct box *box, const float p[static 3])
-{
-    for (int k = 0; k < 3; k++) {
-        box->min[k] = p[k] < box->min[k] ? p[k] : box->min[k];
-        box->max[k] = p[k] > box->max[k] ? p[k] : box->max[k];
-    }
-}
-
-/** Which probe's light l is. */
-static inline int get_probe(const struct light_list *lights, int l)
-{
-    int probe = 0;
-    while (l >= lights->ends[probe])
-        probe++;
-    return probe;
 }
 
 /** Cosine by which light from dir reaches the surface; 0 where it comes from under the horizon. */
