@@ -9,8 +9,9 @@
 #include "server/render/internal.h"
 #include "server/render/sums.h"
 
-/** Near lights that each sample tries. */
+/** Near lights that each sample tries, by random choice; so many or fewer it tries all. */
 #define TRIES 4
+#define ALL_MAX 8
 
 /** The random numbers of one try. */
 static uint64_t get_random(const struct sample *s, int i)
@@ -32,6 +33,11 @@ void gn_pass_get_point(const struct pass *pass, int x, int y, double out[static 
     }
 }
 
+static bool tries_all(const struct frame *frame)
+{
+    return frame->near.cdf && frame->near.n <= ALL_MAX;
+}
+
 void gn_pass_shade(const struct frame *frame, struct scratch *scratch, int n,
                    struct tile_figures *figures)
 {
@@ -49,7 +55,9 @@ void gn_pass_shade(const struct frame *frame, struct scratch *scratch, int n,
                                         &figures->rays_shade);
             gn_places_sum(frame, s, scratch->hidden_places, scratch->cut_places, false, sums);
         }
-        for (int t = 0; t < TRIES && frame->near.cdf; t++) {
+        if (tries_all(frame))
+            gn_near_reference_shade(frame, s, figures);
+        for (int t = 0; t < TRIES && frame->near.cdf && !tries_all(frame); t++) {
             double e[3];
             enum gn_rt_set role;
             gn_near_reference_try(frame, &s->surface, s->org, GN_RT_ALL, get_random(s, t), e, &role,
@@ -107,11 +115,15 @@ void gn_pass_light_receivers(const struct frame *frame, struct scratch *scratch,
                                             &figures->rays_shadow);
             gn_places_sum(frame, s, scratch->hidden_places, scratch->cut_places, false, sums);
         }
+        if (tries_all(frame)) {
+            gn_near_reference_sum(frame, s, false, sums, figures);
+            gn_near_reference_gain(frame, s, figures);
+        }
         for (int k = 0; k < 3; k++) {
             s->open[k] += sums[0][k];
             s->cut[k] += sums[1][k];
         }
-        if (frame->near.cdf)
+        if (frame->near.cdf && !tries_all(frame))
             try_near(frame, s, figures);
     }
 }
