@@ -81,6 +81,30 @@ def test_the_object_and_its_shadow_move():
         assert look(viewer) == first
 
 
+def test_a_move_ends_refining():
+    with open_room() as daemon, Viewer(daemon) as viewer, probe(daemon) as lamp, \
+            tracker(daemon) as hand:
+        light_up(lamp, 1)
+
+        def see():
+            result, payload = viewer.expect_result(viewer.send_frame(lighting_wait_ms=60000))
+            return result.receipt, payload
+
+        receipt, first = see()
+        while receipt.refined_passes < 8:
+            receipt, first = see()
+        hand.send(POSE, pose(.3))
+        wait_for(daemon, 'poses_in', 1)
+        receipt, moved = see()
+        assert receipt.refined_passes == 0 and receipt.rays_primary > 0, receipt
+        assert 'an object has moved since the last frame' in [line.why for line in receipt.left_out]
+        assert moved != first
+        while receipt.refined_passes < 8:
+            receipt, payload = see()
+        off = max(abs(a - b) for a, b in zip(payload, moved))
+        assert off <= 24, 'what is refined is not where the object is: %d codes' % off
+
+
 def test_the_status_says_who_moves_what():
     with open_room() as daemon, tracker(daemon) as hand:
         cube, = read_room(daemon)['movable']
@@ -233,6 +257,7 @@ def test_a_tracker_that_slept_does_not_hurry():
         assert track.returncode == 0 and '30 poses sent, ' in out and 'behind schedule' in out, out
 
 
-run_tests([test_the_object_and_its_shadow_move, test_the_status_says_who_moves_what,
+run_tests([test_the_object_and_its_shadow_move, test_a_move_ends_refining,
+           test_the_status_says_who_moves_what,
            test_the_newest_capture_wins, test_bad_poses_move_nothing, test_a_flood_of_poses,
            test_the_track_command, test_a_tracker_that_slept_does_not_hurry])
