@@ -65,7 +65,7 @@ int gn_cli_render_within(const struct gn_cli_request *request, const struct gn_c
         .budget_ms = request->budget_ms,
         .n_pixels = (int64_t)scene->camera->width * scene->camera->height,
         .n_lights = is_free ? budget.n_lights * n_probes : budget.n_lights,
-        .max_step = GN_SHADOW_STEP_MAX,
+        .max_step = GN_BUDGET_MAX_STEP,
     };
     for (int held = 0; budget.n_frames < MOST && (budget.n_frames < LEAST || held < HOLD);) {
         uint64_t n_switches = controller.n_switches;

@@ -77,7 +77,7 @@ void gn_pace_begin(struct gn_paces *paces, const struct gn_room_options *options
 {
     const struct gn_msg_frame *frame = &job->frame;
     struct gn_budget_frame known = {.budget_ms = options->budget_ms,
-                                    .max_step = GN_SHADOW_STEP_MAX};
+                                    .max_step = GN_BUDGET_MAX_STEP};
     int n_lights;
     *out = (struct gn_pace_turn){.pace = get_pace(paces, job->answer->session_id)};
     if (frame->budget_ms > 0 && (!(known.budget_ms > 0) || frame->budget_ms < known.budget_ms))
