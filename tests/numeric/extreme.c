@@ -143,7 +143,7 @@ static void assert_in_bounds(const struct gn_layers *layers)
     for (int i = 0; i < layers->width * layers->height; i++) {
         const float *v = layers->virtual_rgba.data + 4 * i;
         assert_true(v[3] >= 0 && v[3] <= 1);
-        assert_true(layers->depth.data[i] > 0);
+        assert_true(layers->depth.data[i] >= 0);
         for (int k = 0; k < 3; k++) {
             float factor = layers->shadow.data[3 * i + k];
             float added = layers->added.data[3 * i + k];
