@@ -9,8 +9,8 @@
 
 #include "common/clock.h"
 #include "common/text.h"
-#include "server/render/budget.h"
 #include "server/http/http_internal.h"
+#include "server/render/budget.h"
 
 static double get_ms_since(int64_t then_ns)
 {

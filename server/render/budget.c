@@ -60,8 +60,9 @@ static const int steps[3] = {1, 2, 4};
  * rig's room (640 x 480, 122 lights) has 0.54 and 0.0032 with a step of 2. */
 static const double step_shares[3] = {1, 0.45, 0.3};
 static const double step_errors[3] = {0, 0.004, 0.012};
-/** Taken beforehand: RMS error of the shadow by the grid at edges. Against 4 x 4 rays everywhere the
- * rig's room (means over 59, 122, 178 lights, 320 x 240 and 640 x 480) has 0.028, 0.0095, 0.005. */
+/** Taken beforehand: RMS error of the shadow by the grid at edges. Against 4 x 4 rays everywhere
+ * the rig's room (means over 59, 122, 178 lights, 320 x 240 and 640 x 480) has 0.028, 0.0095,
+ * 0.005. */
 static const double grid_errors[4] = {0, 0.02, 0.009, 0.006};
 
 /** A setting's place among the tables. */

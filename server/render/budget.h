@@ -28,8 +28,8 @@
 /** Least lights that are chosen where there are more. */
 #define GN_BUDGET_LEAST_LIGHTS 4
 
-/** Coarser shadows are not offered: a step of 4 is slower than one of 2 where shadows have edges, as
- * more of what is between has to be worked out. */
+/** Coarser shadows are not offered: a step of 4 is slower than one of 2 where shadows have edges,
+ * as more of what is between has to be worked out. */
 #define GN_BUDGET_MAX_STEP 2
 
 /** What a controller chooses; fields as in struct gn_render_options. */

@@ -178,8 +178,10 @@ static bool follow_photon(const struct photon_job *job, uint64_t i, struct splat
         float pinned[3];
         if (!leave_clear(&photon, &random) || !step(frame, &photon, rays))
             return false;
-        if (!is_clear(surface))
-            return surface->role == GN_RT_REAL && make_splat(job, &photon, out);
+        if (!is_clear(surface)) // what shows things is no receiver: its base is left to walks
+            return surface->role == GN_RT_REAL &&
+                   !(frame->run_optics && gn_optics_is_shown_by(surface)) &&
+                   make_splat(job, &photon, out);
         if (surface->role == GN_RT_REAL && frame->places->n > 0 &&
             gn_blend_get_radiance_at(&frame->blend, surface->point, pinned))
             return false; // a walk ends here, so it has not left the rest to us
@@ -208,13 +210,17 @@ static int reserve(struct caustics *c, const struct gn_scene *scene, size_t n)
         c->counts = malloc(ROUND * sizeof(*c->counts));
         c->rays = malloc(ROUND * sizeof(*c->rays));
         c->targets = malloc((size_t)scene->n_objects * sizeof(*c->targets));
+        if (!c->splats || !c->counts || !c->rays || !c->targets) {
+            gn_caustics_finish(c);
+            return -ENOMEM;
+        }
     }
     if (c->n_pixels < n) {
         free(c->sums);
         c->sums = malloc(3 * n * sizeof(*c->sums));
         c->n_pixels = c->sums ? n : 0;
     }
-    return c->splats && c->counts && c->rays && c->targets && c->sums ? 0 : -ENOMEM;
+    return c->sums ? 0 : -ENOMEM;
 }
 
 void gn_caustics_finish(struct caustics *c)

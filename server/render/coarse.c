@@ -66,7 +66,8 @@ static bool is_same_plane(const struct frame *frame, const struct spot *a, const
            fabsf(dot3(to, a->normal)) < SAME_PLANE * width;
 }
 
-bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_factor[static 3])
+bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_factor[static 3],
+                           float out_color[static 3])
 {
     int step = frame->shadow_step;
     int left = x - x % step;
@@ -77,18 +78,20 @@ bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_fa
     float low[3] = {1, 1, 1};
     float high[3] = {0};
     for (int k = 0; k < 3; k++)
-        out_factor[k] = 0;
+        out_factor[k] = out_color[k] = 0;
     for (int i = 0; i < 4; i++) {
         int at[2] = {left + i % 2 * step, top + i / 2 * step};
         const struct spot *corner = get_spot(frame, at[0], at[1]);
         if (!corner || corner->kind != SPOT_KNOWN || !is_same_plane(frame, spot, corner))
             return false;
         const float *color = gn_refine_get_feature(frame, at[0], at[1])->color;
+        const float *factor = gn_image_at(&frame->layers->shadow, at[0], at[1]);
         float weight = (i % 2 ? u : 1 - u) * (i / 2 ? v : 1 - v);
         for (int k = 0; k < 3; k++) {
             low[k] = fminf(low[k], color[k]);
             high[k] = fmaxf(high[k], color[k]);
-            out_factor[k] += weight * color[k];
+            out_factor[k] += weight * factor[k];
+            out_color[k] += weight * color[k];
         }
     }
     return high[0] - low[0] < LARGEST_STEP && high[1] - low[1] < LARGEST_STEP &&

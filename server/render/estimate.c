@@ -130,9 +130,8 @@ static bool add_near(const struct job *job, const struct sample *s, int set,
     double shift = (double)(random >> 11) * 0x1p-53;
     bool is_cut = false;
     for (int i = 0; i < ESTIMATE_NEAR && truth->near.n_real > 0; i++)
-        gn_near_reference_ask(truth, s, truth->options.shadow_unweighted,
-                              (i + shift) / ESTIMATE_NEAR, gn_estimate_mix(random + (uint64_t)i),
-                              near, rays);
+        gn_near_reference_ask(truth, s, false, (i + shift) / ESTIMATE_NEAR,
+                              gn_estimate_mix(random + (uint64_t)i), near, rays);
     for (int k = 0; k < 3; k++) {
         sums[0][k] += near[0][k] / ESTIMATE_NEAR;
         sums[1][k] += near[1][k] / ESTIMATE_NEAR;

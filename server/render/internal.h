@@ -415,8 +415,10 @@ bool gn_refine_is_needed(const struct frame *frame, int x, int y);
 bool gn_coarse_put_off(const struct frame *frame, int x, int y, struct sample *sample);
 /** True where the pixel's shadow waits. */
 bool gn_coarse_waits(const struct frame *frame, int x, int y);
-/** The shadow of a pixel that waits, by those about it. False: it has to be worked out. */
-bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_factor[static 3]);
+/** The layer's factor and the feature's color of a pixel that waits, by those about it. False: its
+ * shadow has to be worked out. */
+bool gn_coarse_interpolate(const struct frame *frame, int x, int y, float out_factor[static 3],
+                           float out_color[static 3]);
 
 /* layers.c */
 

@@ -102,12 +102,41 @@ static void get_axis(const struct merge_item *items, int n, double axis[static 3
     }
 }
 
-static int compare_items(const void *a, const void *b)
+static bool is_before(const struct merge_item *x, const struct merge_item *y)
 {
-    const struct merge_item *x = a, *y = b;
     if (x->along < y->along || x->along > y->along)
-        return x->along < y->along ? -1 : 1;
-    return x->light - y->light;
+        return x->along < y->along;
+    return x->light < y->light;
+}
+
+static void swap(struct merge_item *x, struct merge_item *y)
+{
+    struct merge_item z = *x;
+    *x = *y;
+    *y = z;
+}
+
+/** Moves item i down the heap of n, of which it may be less than its children. */
+static void sift(struct merge_item *items, int i, int n)
+{
+    for (int child = 2 * i + 1; child < n; i = child, child = 2 * i + 1) {
+        if (child + 1 < n && is_before(&items[child], &items[child + 1]))
+            child++;
+        if (!is_before(&items[i], &items[child]))
+            break;
+        swap(&items[i], &items[child]);
+    }
+}
+
+/** Heap sort: qsort() may take memory, which frames do not. */
+static void sort_items(struct merge_item *items, int n)
+{
+    for (int i = n / 2 - 1; i >= 0; i--)
+        sift(items, i, n);
+    for (int last = n - 1; last > 0; last--) {
+        swap(&items[0], &items[last]);
+        sift(items, 0, last);
+    }
 }
 
 /** Sorts the items across their axis; how many of them are the first part, in [1, n - 1]. */
@@ -119,7 +148,7 @@ static int cut(struct merge_item *items, int n)
     for (int i = 0; i < n; i++)
         items[i].along =
             items[i].dir[0] * axis[0] + items[i].dir[1] * axis[1] + items[i].dir[2] * axis[2];
-    qsort(items, (size_t)n, sizeof(*items), compare_items);
+    sort_items(items, n);
     double weight = sum_up(items, n, all);
     for (int i = 0; i < n - 1; i++) {
         double right[3];
@@ -192,8 +221,11 @@ static void sort_out(struct light_merge *merge, const struct gn_light *lights, i
                 struct merge_item *item = &merge->items[(*out_items)++];
                 item->light = i;
                 item->weight = gn_luminance(light->irradiance);
+                const float *d = light->dir_world; // of unit length, but for its rounding
+                double length =
+                    sqrt((double)d[0] * d[0] + (double)d[1] * d[1] + (double)d[2] * d[2]);
                 for (int k = 0; k < 3; k++)
-                    item->dir[k] = (double)light->dir_world[k];
+                    item->dir[k] = length > 0 ? d[k] / length : 0;
             }
         }
         if (!near)

@@ -25,7 +25,7 @@
 /** Ends of one tree of ways, of which MAX_WAYS wait at one time; what is beyond sees the map. */
 #define MAX_ENDS 32
 #define MAX_WAYS 16
-/** Ways that bring less of the sample's radiance see the map. */
+/** Ways that bring less of what their tree stands for see the map. */
 #define MIN_WEIGHT (1.0 / 256)
 /** Facets of rough glass that are tried from each sample: interactive and seed, reference. */
 #define FACETS 8
@@ -61,6 +61,7 @@ struct tree {
     struct optics *optics;
     struct sample *root;
     int parent, first; // the root's index; the tree's first end
+    double least;      // weight of ways that are followed
     uint64_t random;
     struct tile_figures *figures;
 };
@@ -136,7 +137,7 @@ static void push(struct tree *tree, const struct way *way)
     double largest = fmax(way->weight[0], fmax(way->weight[1], way->weight[2]));
     if (!(largest > 0))
         return;
-    if (largest < MIN_WEIGHT || way->depth > MIRROR_DEPTH || optics->n_ways == MAX_WAYS)
+    if (largest < tree->least || way->depth > MIRROR_DEPTH || optics->n_ways == MAX_WAYS)
         see_map(tree, way);
     else
         optics->ways[optics->n_ways++] = *way;
@@ -262,6 +263,18 @@ static void follow_all(struct tree *tree, int index, int n)
     }
 }
 
+/** In a pass of the global model: what modelled surfaces send. */
+static void add_places(const struct frame *frame, struct scratch *scratch, struct sample *s,
+                       uint64_t *rays)
+{
+    double sums[2][3] = {{0}};
+    (void)gn_places_find_hidden(frame, scratch, s, GN_RT_REAL, scratch->hidden_places, rays);
+    memset(scratch->cut_places, 0, (size_t)frame->places->n);
+    gn_places_sum(frame, s, scratch->hidden_places, scratch->cut_places, false, sums);
+    for (int k = 0; k < 3; k++)
+        s->open[k] += sums[0][k];
+}
+
 /** What a receiver sends among the real objects alone. */
 static void get_base(const struct frame *frame, struct scratch *scratch, struct sample *s,
                      int n_paths, struct tile_figures *figures)
@@ -272,6 +285,8 @@ static void get_base(const struct frame *frame, struct scratch *scratch, struct 
     }
     memset(s->cut, 0, sizeof(s->cut));
     gn_shade_get_irradiance(frame, scratch, s, GN_RT_REAL, 0, 1, s->open, figures);
+    if (frame->pass && frame->places->n > 0)
+        add_places(frame, scratch, s, &figures->rays_shadow);
     gn_shadow_weigh(frame, s);
 }
 
@@ -366,9 +381,13 @@ void gn_optics_samples(const struct frame *frame, struct scratch *scratch, int n
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_REAL || !gn_optics_is_shown_by(&s->surface))
             continue;
-        struct tree tree = {
-            .frame = frame, .optics = optics, .root = s, .parent = i, .figures = figures};
         int n_trees = is_rough(&s->surface) ? n_facets : 1;
+        struct tree tree = {.frame = frame,
+                            .optics = optics,
+                            .root = s,
+                            .parent = i,
+                            .least = MIN_WEIGHT / n_trees,
+                            .figures = figures};
         figures->n_optics++;
         gn_shadow_clear(s);
         memset(s->indirect, 0, sizeof(s->indirect));

@@ -18,6 +18,7 @@ enum line {
     OPTICS,
     CAUSTICS,
     BOUNCES,
+    COARSE,
     N_LINES
 };
 
@@ -25,6 +26,7 @@ static const char *const pass_names[N_LINES] = {
     [PRIMARY] = "primary", [REFINE] = "refine", [SHADE] = "shade",       [MIRROR] = "mirror",
     [GLOSSY] = "glossy",   [SHADOW] = "shadow", [BLOCKERS] = "blockers", [NEAR] = "near",
     [ADDED] = "added",     [OPTICS] = "optics", [CAUSTICS] = "caustics", [BOUNCES] = "bounces",
+    [COARSE] = "coarse",
 };
 
 /** why_not NULL: the pass runs, because of why. */
@@ -184,6 +186,19 @@ static const char *why_added(const struct frame *frame)
                                      : "light that virtual objects send to real ones";
 }
 
+static const char *why_not_coarse(const struct frame *frame)
+{
+    if (frame->options.shadow_step <= 1)
+        return "every pixel's own shadow was asked for";
+    if (frame->options.quality != GN_QUALITY_INTERACTIVE)
+        return "a coarser shadow is of the interactive quality";
+    if (!frame->run_shadow)
+        return "no shadow";
+    if (frame->run_optics)
+        return "real mirrors or glass show shadows of their own";
+    return frame->skips ? NULL : "every pixel is needed";
+}
+
 void gn_plan_make(struct frame *frame, const double slopes[static 4],
                   struct gn_render_report *report)
 {
@@ -234,9 +249,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
              "virtual mirrors or glass may throw light onto real ones");
     const char *no_optics = why_not_optics(frame);
     frame->run_optics = !no_optics;
-    bool is_coarse = options->shadow_step > 1 && frame->skips && frame->run_shadow &&
-                     !frame->run_optics && options->quality == GN_QUALITY_INTERACTIVE;
-    frame->shadow_step = is_coarse ? options->shadow_step : 1;
+    const char *no_coarse = why_not_coarse(frame);
+    frame->shadow_step = no_coarse ? 1 : options->shadow_step;
+    set_line(report, COARSE, no_coarse, "the shadow is worked out for some pixels, smooth between");
     set_line(report, OPTICS, no_optics, "a real mirror or glass may show virtual objects");
     set_line(report, BOUNCES, why_not_bounces(frame), "bounces were asked for");
     bool can_add = frame->run_bounces || frame->near.n_virtual > 0;

@@ -154,7 +154,8 @@ void gn_renderer_destroy(struct gn_renderer **renderer);
  * (render/refine.c has the rule and the table of grids). A pixel's shadow factor is the ratio of
  * its rays' sums, so that an edge between two real surfaces weighs them by the light they send.
  * layers must have been made by gn_layers_init; it is resized where its size
- * differs from the camera's (the only allocation; none while the size stays). Same bits whatever
+ * differs from the camera's (the only allocation; none while the size stays, but once for the first
+ * frame with a shadow_step and the first with fewer lights than there are). Same bits whatever
  * the pool's size. Returns 0, -EINVAL and a sentence, -ENOMEM.
  */
 GN_MUST_USE int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *camera,

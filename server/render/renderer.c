@@ -272,7 +272,8 @@ static int check_request(const struct gn_scene *scene, const struct gn_camera *c
     if (options->grid < 0 || options->grid > MAX_GRID)
         return gn_error_set(out_error, -EINVAL, "render: a grid of %d rays, must be 1 to %d",
                             options->grid, MAX_GRID);
-    if (options->shadow_step < 0 || options->shadow_step > GN_SHADOW_STEP_MAX || options->shadow_step == 3)
+    if (options->shadow_step < 0 || options->shadow_step > GN_SHADOW_STEP_MAX ||
+        options->shadow_step == 3)
         return gn_error_set(out_error, -EINVAL, "render: a shadow step of %d, must be 1, 2 or 4",
                             options->shadow_step);
     if (options->bounces < 0 || options->bounces > MAX_BOUNCES)

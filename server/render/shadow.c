@@ -179,9 +179,11 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
             gn_receivers_add(r, scratch->samples, i, frame->blend.n);
     }
     gn_receivers_end(r, frame->blend.n);
-    if (r->n == 0)
+    if (r->n == 0 && !frame->pass) // what sees nothing has its share in a pass
         return;
-    gn_shadow_list_lights(frame, scratch, &r->box);
+    scratch->n_shadow_lights = 0;
+    if (r->n > 0)
+        gn_shadow_list_lights(frame, scratch, &r->box);
     if (scratch->n_shadow_lights == 0 && frame->near.n == 0 && !frame->pass)
         return;
     gn_occlusion_clear(frame, scratch);
@@ -196,7 +198,7 @@ void gn_shadow_samples(const struct frame *frame, struct scratch *scratch, int n
         r->wanted[j / LANES] |= (uint16_t)(is_wanted << (j % LANES));
         is_any_wanted |= is_wanted;
     }
-    if (!is_any_wanted)
+    if (!is_any_wanted && !frame->pass)
         return;
     if (frame->run_blockers) {
         uint64_t rays = 0;

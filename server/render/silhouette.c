@@ -375,6 +375,9 @@ int gn_silhouettes_make(struct silhouettes *silhouettes, const struct clusters *
     int ret = reserve(silhouettes, lights->n, pool ? gn_pool_get_size(pool) : 1);
     if (ret < 0)
         return ret;
+    if (silhouettes->margin != margin)
+        gn_silhouettes_forget(silhouettes);
+    silhouettes->margin = margin;
     for (int i = silhouettes->n; i < lights->n; i++)
         memset(silhouettes->of[i].dir, 0, sizeof(silhouettes->of[i].dir)); // no light's
     silhouettes->n = silhouettes->n > lights->n ? silhouettes->n : lights->n;

@@ -29,6 +29,7 @@ struct silhouette {
 struct silhouettes {
     int n, capacity;
     struct silhouette *of;       // [n], owned
+    float margin;                // that they were made with
     float *planes;               // [8][capacity] their axes (6) and offsets (2), owned
     struct projected *projected; // [workers of the pool] working memory, owned
 };

@@ -49,7 +49,7 @@ struct sums {
 struct sums_error {
     double shadow; // of the factor times the real share of the pixel: standard error, RMS over
                    // pixels and channels that a shadow or its start changes
-    double put;    // of virtual + added radiance, RMS over the picture, over its RMS
+    double put;    // of virtual + added radiance, RMS over pixels that have some, over its mean
     double shadow_share; // [0, 1] of the sums in the best mean of sums and start; 1 - that: the
     double put_share;    // start's
 };

@@ -208,7 +208,9 @@ static void see_again(const struct frame *frame, struct scratch *scratch, int (*
         gn_primary_aim(frame,
                        frame->rays + 3 * ((size_t)y * (size_t)frame->camera->width + (size_t)x), s);
     }
+    int64_t start = gn_clock_get_monotonic_ns();
     gn_primary_trace(frame, scratch->samples, n, figures);
+    figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
     process_samples(frame, scratch, n, frame->options.paths_per_pixel, figures);
     for (int i = 0; i < n; i++) {
         gn_layers_resolve(frame, pixels[i][0], pixels[i][1], &scratch->samples[i], 1);
@@ -226,18 +228,19 @@ static void render_between(void *context, int item, int worker)
         int x;
         int y;
         float factor[3];
+        float color[3];
         get_corner(frame, item, i / LANES, &x, &y);
         x += i % BLOCK;
         y += i % LANES / BLOCK;
         if (!gn_coarse_waits(frame, x, y))
             continue;
-        if (!gn_coarse_interpolate(frame, x, y, factor)) {
+        if (!gn_coarse_interpolate(frame, x, y, factor, color)) {
             again[n][0] = x;
             again[n++][1] = y;
             continue;
         }
         memcpy(gn_image_at(&frame->layers->shadow, x, y), factor, sizeof(factor));
-        memcpy(get_feature(frame, x, y)->color, factor, sizeof(factor));
+        memcpy(get_feature(frame, x, y)->color, color, sizeof(color));
     }
     if (n > 0)
         see_again(frame, &frame->scratches[worker], again, n, &frame->figures[item]);

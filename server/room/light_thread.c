@@ -202,7 +202,7 @@ static struct gn_light_options get_light_options(const struct gn_room *room, str
     options.no_sh = !wants.sh;
     options.want_pyramid = wants.pyramid;
     options.no_lights = !wants.lights;
-    if (wants.n_lights > 0)
+    if (wants.n_lights > 0 && wants.n_lights < GN_LIGHTS_MAX)
         options.n_lights = wants.n_lights;
     return options;
 }

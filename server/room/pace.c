@@ -42,18 +42,29 @@ int gn_paces_get_wanted(const struct gn_paces *paces)
     return most;
 }
 
-/** The lights of all probes; and so many as there could be if that was wished. */
-static void count_lights(const struct gn_room_options *options,
-                         const struct gn_lighting_state *light, int *out_n, int *out_possible)
+/** Lights of all probes. */
+struct light_count {
+    int n; // that there are, fading ones among them
+    int n_probes;
+    int each; // of a probe if all were wished; 0: its number cannot be wished
+};
+
+static struct light_count count_lights(const struct gn_room_options *options,
+                                       const struct gn_lighting_state *light)
 {
-    int n = light->n_lights, n_probes = 1 + light->n_others;
+    struct light_count count = {.n = light->n_lights, .n_probes = 1 + light->n_others};
     for (int i = 0; i < light->n_others; i++)
-        n += light->others[i]->n_lights;
-    bool is_free = options->light.method != GN_LIGHT_PARTITION_SEED && n > 0;
-    int each = options->light.n_lights > 0 ? options->light.n_lights : DEFAULT_LIGHTS;
-    int possible = is_free ? n_probes * each : 0;
-    *out_n = n;
-    *out_possible = possible > n ? possible : n;
+        count.n += light->others[i]->n_lights;
+    if (options->light.method != GN_LIGHT_PARTITION_SEED && count.n > 0)
+        count.each = options->light.n_lights > 0 ? options->light.n_lights : DEFAULT_LIGHTS;
+    return count;
+}
+
+/** What each probe should make so that all have n together; 0: all. */
+static int get_wish(const struct light_count *count, int n)
+{
+    int each = (n + count->n_probes - 1) / count->n_probes;
+    return each < count->each ? each : 0;
 }
 
 /** The part of the pixels to ask. A setting or size that the sums are not of forgets them. */
@@ -68,7 +79,7 @@ static int get_part(struct gn_pace *pace, const struct gn_budget_setting *settin
     pace->setting = *setting;
     pace->width = width;
     pace->height = height;
-    return (int)(pace->n_asked++ % GN_ERROR_PARTS);
+    return (int)(pace->n_asked % GN_ERROR_PARTS);
 }
 
 void gn_pace_begin(struct gn_paces *paces, const struct gn_room_options *options,
@@ -78,19 +89,21 @@ void gn_pace_begin(struct gn_paces *paces, const struct gn_room_options *options
     const struct gn_msg_frame *frame = &job->frame;
     struct gn_budget_frame known = {.budget_ms = options->budget_ms,
                                     .max_step = GN_BUDGET_MAX_STEP};
-    int n_lights;
     *out = (struct gn_pace_turn){.pace = get_pace(paces, job->answer->session_id)};
     if (frame->budget_ms > 0 && (!(known.budget_ms > 0) || frame->budget_ms < known.budget_ms))
         known.budget_ms = (double)frame->budget_ms;
     if (known.budget_ms > 0 && frame->quality == GN_MSG_QUALITY_INTERACTIVE) {
         for (size_t i = 0; i < frame->views_count; i++)
             known.n_pixels += (int64_t)job->cameras[i].width * job->cameras[i].height;
-        count_lights(options, light, &n_lights, &known.n_lights);
+        const struct light_count count = count_lights(options, light);
+        known.n_lights = count.each > 0 ? count.n_probes * count.each : count.n;
         gn_budget_choose(&out->pace->budget, &known, &out->choice);
         out->budget_ms = known.budget_ms;
-        out->outcome.n_lights = n_lights;
+        out->outcome.n_lights = count.n;
+        out->pace->n_wanted = get_wish(&count, out->choice.setting.n_lights);
+    } else {
+        out->pace->n_wanted = 0;
     }
-    out->pace->n_wanted = out->choice.setting.n_lights;
     out->part =
         get_part(out->pace, &out->choice.setting, job->cameras[0].width, job->cameras[0].height);
 }
@@ -129,6 +142,7 @@ void gn_pace_end(struct gn_pace_turn *turn, const struct gn_frame_job *job, doub
 {
     struct gn_pace *pace = turn->pace;
     struct gn_budget_outcome *outcome = &turn->outcome;
+    pace->n_asked++;
     double error = get_error(pace, job->frame.views_count);
     receipt->estimated_error = (float)error;
     if (!(turn->budget_ms > 0))

@@ -21,7 +21,7 @@ struct gn_pace {
     uint64_t session_id; // 0: free
     uint64_t used;       // the frame that used it last
     struct gn_budget budget;
-    int n_wanted; // lights of its last frame; 0: all there are
+    int n_wanted; // lights of each probe for its last frame; 0: all there can be
     // Of the last frames of this setting and size, by view and part of the pixels.
     struct gn_budget_setting setting;
     int width, height;

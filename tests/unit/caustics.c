@@ -290,10 +290,10 @@ static void test_the_same_bits_on_any_number_of_threads(void **state)
 {
     (void)state;
     const struct gn_render_options options = {
-        .quality = GN_QUALITY_REFERENCE, .single_ray = true, .paths_per_pixel = 3};
+        .quality = GN_QUALITY_REFERENCE, .single_ray = true, .paths_per_pixel = 256};
     const struct gn_render_options all = {.quality = GN_QUALITY_REFERENCE,
                                           .single_ray = true,
-                                          .paths_per_pixel = 3,
+                                          .paths_per_pixel = 256, // many chunks, two rounds
                                           .all_passes = true};
     struct gn_test_stage stages[3] = {{0}};
     size_t n = (size_t)WIDTH * HEIGHT * 3 * sizeof(float);

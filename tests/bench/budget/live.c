@@ -40,8 +40,10 @@ static void run_frame(struct gn_bench_rig *rig, struct gn_lighting_state **light
                       int width, double budget_ms, int frame, struct gn_budget_choice *choice,
                       double *out_ms)
 {
-    const struct gn_budget_frame known = {
-        .budget_ms = budget_ms, .n_pixels = width * (width * 3 / 4), .n_lights = LIGHTS};
+    const struct gn_budget_frame known = {.budget_ms = budget_ms,
+                                          .n_pixels = width * (width * 3 / 4),
+                                          .n_lights = LIGHTS,
+                                          .max_step = GN_BUDGET_MAX_STEP};
     uint64_t n_switches = budget->n_switches;
     gn_budget_choose(budget, &known, choice);
     if (!*light || budget->n_switches != n_switches) {
@@ -52,6 +54,7 @@ static void run_frame(struct gn_bench_rig *rig, struct gn_lighting_state **light
     }
     move(rig, width, frame);
     const struct gn_render_options options = {.grid = choice->setting.grid,
+                                              .shadow_step = choice->setting.shadow_step,
                                               .estimate_error = true,
                                               .estimate_parts = GN_ERROR_PARTS,
                                               .estimate_part = frame % GN_ERROR_PARTS};
@@ -87,12 +90,12 @@ static void run(struct gn_bench_rig *rig, int width, double budget_ms)
         run_frame(rig, &light, &budget, sums, width, budget_ms, i, &choice, &ms[i]);
     }
     qsort(ms + FIRST, FRAMES - FIRST, sizeof(*ms), compare_doubles);
-    printf("%5d %6.0f  %-9s %6d %5d %11.1f %8.1f %6.1f %5d/%d %9d %12.4f %10.4f\n", width,
+    printf("%5d %6.0f  %-9s %6d %5d %5d %11.1f %8.1f %6.1f %5d/%d %9d %12.4f %10.4f\n", width,
            budget_ms, gn_budget_get_verdict_name(choice.verdict), choice.setting.n_lights,
-           choice.setting.grid, choice.predicted_ms, ms[FIRST + (FRAMES - FIRST) / 2],
-           ms[FIRST + (FRAMES - FIRST) * 9 / 10], (int)(budget.n_misses - misses), FRAMES - FIRST,
-           (int)(budget.n_switches - switches), choice.predicted_error,
-           gn_error_sums_get(sums, GN_ERROR_PARTS));
+           choice.setting.grid, choice.setting.shadow_step, choice.predicted_ms,
+           ms[FIRST + (FRAMES - FIRST) / 2], ms[FIRST + (FRAMES - FIRST) * 9 / 10],
+           (int)(budget.n_misses - misses), FRAMES - FIRST, (int)(budget.n_switches - switches),
+           choice.predicted_error, gn_error_sums_get(sums, GN_ERROR_PARTS));
     gn_lighting_state_unref(&light);
 }
 
@@ -101,9 +104,9 @@ int main(void)
     static const double budgets_ms[] = {8, 16, 33, 66};
     struct gn_bench_rig rig;
     gn_bench_rig_init(&rig, 0);
-    printf("%5s %6s  %-9s %6s %5s %11s %8s %6s %9s %9s %12s %10s\n", "width", "budget", "verdict",
-           "lights", "grid", "predicted", "median", "90 %", "late", "switches", "pred. error",
-           "estimated");
+    printf("%5s %6s  %-9s %6s %5s %5s %11s %8s %6s %9s %9s %12s %10s\n", "width", "budget",
+           "verdict", "lights", "grid", "step", "predicted", "median", "90 %", "late", "switches",
+           "pred. error", "estimated");
     for (size_t i = 0; i < sizeof(budgets_ms) / sizeof(budgets_ms[0]); i++) {
         run(&rig, 320, budgets_ms[i]);
         run(&rig, 640, budgets_ms[i]);
