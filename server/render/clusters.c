@@ -6,7 +6,7 @@
  * at the middle of its centroids until there are enough. Those of movable objects are made in mesh
  * coordinates and taken to where the objects stand.
  */
-#include "server/render/internal.h"
+#include "server/render/clusters.h"
 
 #include <errno.h>
 #include <math.h>

@@ -78,6 +78,7 @@ static void dump_bytes(const char *path, const void *p)
         struct gn_msg_frame_view: dump_frame_view,                                                 \
         struct gn_msg_result_view: dump_result_view,                                               \
         struct gn_msg_left_out: dump_left_out,                                                     \
+        struct gn_msg_budget_use: dump_budget_use,                                                 \
         struct gn_msg_receipt: dump_receipt,                                                       \
         default: dump_bytes)(path, &(v))
 #define PATH(...)                                                                                  \
@@ -119,6 +120,7 @@ static void dump_projection(const char *parent, const void *p);
 static void dump_frame_view(const char *parent, const void *p);
 static void dump_result_view(const char *parent, const void *p);
 static void dump_left_out(const char *parent, const void *p);
+static void dump_budget_use(const char *parent, const void *p);
 static void dump_receipt(const char *parent, const void *p);
 
 DEFINE_DUMP(TRANSFORM, transform)
@@ -127,6 +129,7 @@ DEFINE_DUMP(PROJECTION, projection)
 DEFINE_DUMP(FRAME_VIEW, frame_view)
 DEFINE_DUMP(RESULT_VIEW, result_view)
 DEFINE_DUMP(LEFT_OUT, left_out)
+DEFINE_DUMP(BUDGET_USE, budget_use)
 DEFINE_DUMP(RECEIPT, receipt)
 DEFINE_DUMP(HELLO, hello)
 DEFINE_DUMP(WELCOME, welcome)
