@@ -41,7 +41,7 @@ static const struct gn_option option_table[] = {
      .value_name = "RADIUS",
      .help =
          "Instead, to try things out: once in 4 s around the world's z axis at this distance in "
-         "metres, until Ctrl-C or --count."},
+         "metres, at height 0, until Ctrl-C or --count."},
     {.key = "rate",
      .flag = "rate",
      .type = GN_OPTION_DOUBLE,

@@ -138,6 +138,9 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
     if (has_dir == has_files || has_files != gn_options_is_set(options, NULL, NULL, "camera"))
         return "give --sequence DIR, or --files PATTERN with --camera FILE";
+    if (gn_options_get_double(options, NULL, NULL, "budget-ms") > 0 &&
+        gn_options_get_enum(options, NULL, NULL, "quality") != 0)
+        return "--budget-ms is for --quality interactive: the others' settings are not chosen";
     return NULL;
 }
 

@@ -177,7 +177,7 @@ static void judge(struct gn_progressive *p)
         f->error = fmax(error.shadow, error.put);
     }
     if (round >= TRUSTED_ROUND && f->error <= p->own.error)
-        f->why_done = "converged: further passes change nothing that can be seen";
+        f->why_done = "converged: its error is no more than was asked for";
     else if (f->n_passes + REPLICATES > p->own.max_passes)
         f->why_done = "all passes are done";
 }
