@@ -147,7 +147,8 @@ static const struct gn_option table[] = {
      .help = "What real objects already shade is not shaded again; false: as in the paper."},
     {ROOM, .key = "refine", .type = GN_OPTION_BOOL, .default_value = "true",
      .help = "Interactive views whose pose, light and scene hold still are refined from frame to "
-             "frame until they are as the reference; false: they are rendered like any."},
+             "frame, within their budget, until they are as the reference without bounces and "
+             "caustics; false: they are rendered like any."},
     {ROOM, .key = "composite", .type = GN_OPTION_ENUM, .choices = "linear|codes",
      .default_value = "linear",
      .help = "Where the shadow is multiplied in: in linear light, or on the picture's codes, as in "

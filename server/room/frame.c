@@ -39,6 +39,7 @@ struct gn_frame_maker {
     struct gn_buf_pool *payloads;
     struct gn_paces paces;
     uint64_t n_frames;
+    double after_ms; // that a pixel's compositing and encoding takes, rather more
     struct frame_buffers buffers[GN_FRAME_KEPT_SIZES];
 };
 
@@ -218,6 +219,7 @@ struct work {
     struct gn_msg_result *result;      // being filled, in the job's answer's place
     struct gn_buf *payload;            // being filled
     size_t used;                       // bytes of it
+    int64_t start_ns;                  // when the frame's work began
     struct gn_pace_turn turn;          // of the viewer
     bool is_refined;                   // a view of it
     const struct gn_image8 *composite; // of the view made last
@@ -230,7 +232,7 @@ static void tell_step(void *context, const struct gn_render_report *report)
 
 /** The layers of a view that has held still since its last frame. False: it has not, or this
  * failed. Else what is to be told of the frame, *out_why, and the slot that wants to know of it. */
-static bool refine_view(struct work *w, const struct gn_still_view *view, int *out_slot,
+static bool refine_view(struct work *w, const struct gn_still_view *view, int *out_place,
                         const char **out_why, const struct gn_layers **out_layers)
 {
     static struct gn_log_limiter limiter = {.burst = 5, .interval_ns = 10 * GN_NS_PER_S};
@@ -238,12 +240,12 @@ static bool refine_view(struct work *w, const struct gn_still_view *view, int *o
     struct gn_msg_receipt *receipt = &w->result->receipt;
     struct gn_still_picture picture;
     struct gn_error error = {0};
-    *out_slot = -1;
+    *out_place = -1;
     *out_why = w->maker->options->no_refining ? "switched off for the room"
-                                              : gn_still_look(still, view, out_slot);
+                                              : gn_still_look(still, view, out_place);
     if (*out_why)
         return false;
-    if (gn_still_refine(still, *out_slot, tell_step, receipt, &picture, &error) < 0) {
+    if (gn_still_refine(still, *out_place, tell_step, receipt, &picture, &error) < 0) {
         gn_log_limited(&limiter, GN_LOG_WARN, "a still view is not refined: %s", error.text);
         *out_why = "refining failed";
         return false;
@@ -259,6 +261,20 @@ static bool refine_view(struct work *w, const struct gn_still_view *view, int *o
     return true;
 }
 
+/** An even share for a view in what is left of the frame's budget; INFINITY: it has none. */
+static double get_left_ms(const struct work *w, size_t index, int64_t now_ns)
+{
+    double pixels = 0;
+    size_t n_views = w->job->frame.views_count;
+    if (!(w->turn.budget_ms > 0))
+        return INFINITY;
+    for (size_t i = index; i < n_views; i++)
+        pixels += (double)w->job->cameras[i].width * w->job->cameras[i].height;
+    return (w->turn.budget_ms - gn_clock_get_ms_between(w->start_ns, now_ns) -
+            w->maker->after_ms * pixels) /
+           (double)(n_views - index);
+}
+
 /** The layers of a view, refined or rendered into b->layers. */
 static int make_layers(struct work *w, size_t index, const struct gn_render_options *options,
                        struct frame_buffers *b, const struct gn_layers **out_layers,
@@ -266,23 +282,25 @@ static int make_layers(struct work *w, size_t index, const struct gn_render_opti
 {
     struct gn_frame_maker *m = w->maker;
     const struct gn_camera *camera = &w->job->cameras[index];
+    int64_t now_ns = gn_clock_get_monotonic_ns();
     const struct gn_still_view view = {
         .session_id = w->job->answer->session_id,
         .index = index,
         .camera = camera,
         .light = w->light,
         .options = options,
-        .now_ns = gn_clock_get_monotonic_ns(),
+        .now_ns = now_ns,
+        .left_ms = get_left_ms(w, index, now_ns),
     };
     struct gn_render_report report = {0};
-    int slot;
+    int place;
     const char *why;
-    if (refine_view(w, &view, &slot, &why, out_layers))
+    if (refine_view(w, &view, &place, &why, out_layers))
         return 0;
     int rc = gn_renderer_render(m->renderer, camera, w->light, options, &b->layers, &report, error);
     if (rc < 0)
         return rc;
-    gn_still_note(m->still, slot, &report);
+    gn_still_note(m->still, place, &report);
     gn_pace_put_report(&w->turn, (int)index, &report);
     gn_progressive_add_plan(&report, false, why);
     add_report(&w->result->receipt, &report);
@@ -411,7 +429,11 @@ void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
     *out_outcome = (struct gn_frame_outcome){0};
     maker->n_frames++;
     struct gn_note *answer = job->answer;
-    struct work w = {.maker = maker, .job = job, .light = light, .result = &answer->body.result};
+    struct work w = {.maker = maker,
+                     .job = job,
+                     .light = light,
+                     .result = &answer->body.result,
+                     .start_ns = start_ns};
     if (gn_buf_pool_get(maker->payloads, get_payload_bound(job), &w.payload) < 0) {
         out_outcome->reason = GN_MSG_DROP_REASON_INTERNAL;
         gn_error_set(&out_outcome->error, -ENOMEM, "out of memory for the result");
@@ -436,6 +458,9 @@ void gn_frame_maker_make(struct gn_frame_maker *maker, struct gn_frame_job *job,
     double pixels = 0;
     for (size_t i = 0; i < job->frame.views_count; i++)
         pixels += (double)job->cameras[i].width * job->cameras[i].height;
+    const struct gn_msg_receipt *receipt = &w.result->receipt;
+    double after_ms = (double)(receipt->composite_ms + receipt->encode_ms) / pixels;
+    maker->after_ms = fmax(after_ms, 0.9 * maker->after_ms + 0.1 * after_ms);
     out_outcome->busy_ms = (double)(gn_clock_get_monotonic_ns() - start_ns) * 1e-6;
     if (!w.is_refined)
         gn_pace_end(&w.turn, job, out_outcome->busy_ms, &w.result->receipt);

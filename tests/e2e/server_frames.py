@@ -143,6 +143,14 @@ def test_a_still_view_is_refined():
         receipt, _ = see(pose=moved, quality=pb.QUALITY_SEED)
         assert why_not_refined(receipt) == ["seed quality is the paper's picture, not a step to "
                                             "another"]
+    with Daemon('budget-ms = 0.001') as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
+        light_up(light, 1)
+        for i in range(12):
+            receipt = viewer.expect_result(viewer.send_frame(lighting_min_sequence=1,
+                                                             lighting_wait_ms=60000))[0].receipt
+            assert receipt.refined_passes == 0 and receipt.HasField('budget'), receipt
+            assert why_not_refined(receipt) == ["a pass takes longer than the frame's budget" if i
+                                                else "the view's first frame"], receipt
     with Daemon('refine = false') as daemon, probe(daemon) as light, \
             Viewer(daemon) as viewer:
         light_up(light, 1)
