@@ -10,6 +10,8 @@
 #ifndef GN_SERVER_RENDER_INTERNAL_H
 #define GN_SERVER_RENDER_INTERNAL_H
 
+#include <stdatomic.h>
+
 #include "server/render/kernels/kernels.h"
 #include "server/render/light_merge.h"
 #include "server/render/lights.h"
@@ -176,7 +178,8 @@ struct tile_figures {
 
 /** One frame, const while the workers run. */
 struct frame {
-    uint64_t serial; // of the renderer's frames, the first is 1
+    uint64_t serial;                 // of the renderer's frames, the first is 1
+    const atomic_bool *is_cancelled; // the renderer's
     const struct gn_scene *scene;
     const struct gn_rt *rt;
     const struct gn_kernels *kernels;
@@ -438,6 +441,12 @@ bool gn_packet_add(struct scratch *scratch, const float org[static 3], const flo
 /** Traces what the packet holds and empties it; bit i: lane i is hidden. *out_n: lanes. */
 uint32_t gn_packet_trace(const struct frame *frame, struct scratch *scratch, enum gn_rt_set set,
                          int *out_n, uint64_t *rays);
+
+/** True where nobody wants the frame any more: what is left of it may be left out. */
+static inline bool is_cancelled(const struct frame *frame)
+{
+    return atomic_load_explicit(frame->is_cancelled, memory_order_relaxed);
+}
 
 static inline float dot3(const float a[static 3], const float b[static 3])
 {

@@ -345,7 +345,7 @@ void gn_reference_shade(const struct frame *frame, struct scratch *scratch, int 
                         struct tile_figures *figures)
 {
     clear_masks(frame, scratch->cut_texels, scratch->cut_places);
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !is_cancelled(frame); i++) {
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
             continue;
@@ -417,7 +417,7 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
                          struct tile_figures *figures)
 {
     bool groups[BATCH];
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !is_cancelled(frame); i++) {
         struct sample *s = &scratch->samples[i];
         gn_shadow_clear(s);
         if (!s->is_receiver)
@@ -431,7 +431,7 @@ void gn_reference_shadow(const struct frame *frame, struct scratch *scratch, int
     // The rest of a pixel that loses light somewhere: what it weighs in the pixel's ratio.
     gn_shadow_find_groups(frame, scratch->samples, n, groups);
     clear_masks(frame, scratch->cut_texels, scratch->cut_places);
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !is_cancelled(frame); i++) {
         struct sample *s = &scratch->samples[i];
         if (!groups[s->group] || s->is_summed || s->kind == SAMPLE_VIRTUAL)
             continue;

@@ -146,6 +146,11 @@ GN_MUST_USE int gn_renderer_create(const struct gn_scene *scene, struct gn_pool 
  * objects): clusters of triangles and boxes follow.
  */
 void gn_renderer_set_scene(struct gn_renderer *renderer, const struct gn_scene *posed);
+/**
+ * Ends the frame that is rendered, and all later ones, soon: they return -ECANCELED and leave their
+ * layers undefined. Thread-safety: safe, at any time until destroy.
+ */
+void gn_renderer_cancel(struct gn_renderer *renderer);
 /** NULL-safe; nulls *renderer. */
 void gn_renderer_destroy(struct gn_renderer **renderer);
 
@@ -156,7 +161,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer);
  * layers must have been made by gn_layers_init; it is resized where its size
  * differs from the camera's (the only allocation; none while the size stays, but once for the first
  * frame with a shadow_step and the first with fewer lights than there are). Same bits whatever
- * the pool's size. Returns 0, -EINVAL and a sentence, -ENOMEM.
+ * the pool's size. Returns 0, -EINVAL and a sentence, -ENOMEM, -ECANCELED.
  */
 GN_MUST_USE int gn_renderer_render(struct gn_renderer *renderer, const struct gn_camera *camera,
                                    const struct gn_lighting_state *light,

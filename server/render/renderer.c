@@ -26,6 +26,7 @@ struct gn_renderer {
     const struct gn_scene *posed; // borrowed: where its movable objects stand
     uint64_t version;             // of the scene that the boxes are of
     uint64_t n_frames;
+    atomic_bool is_cancelled;
     struct gn_pool *pool; // borrowed, may be NULL
     int n_workers;
     struct scratch *scratches; // [n_workers], owned
@@ -121,6 +122,11 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     free(self->spots);
     free(self->figures);
     free(self);
+}
+
+void gn_renderer_cancel(struct gn_renderer *renderer)
+{
+    atomic_store_explicit(&renderer->is_cancelled, true, memory_order_relaxed);
 }
 
 void gn_renderer_set_scene(struct gn_renderer *renderer, const struct gn_scene *posed)
@@ -354,6 +360,7 @@ static void init_frame(struct frame *frame, struct gn_renderer *renderer)
         frame->origin[i] = (float)m[4 * i + 3];
     }
     frame->serial = ++renderer->n_frames;
+    frame->is_cancelled = &renderer->is_cancelled;
     frame->scene = renderer->posed;
     frame->rt = renderer->posed->rt;
     frame->pixel_angle = (float)(1 / fmax(frame->camera->fx, frame->camera->fy));
@@ -468,6 +475,8 @@ static int render_frame(struct gn_renderer *renderer, struct frame *frame,
     report.ms_plan = 1e-6 * (double)(gn_clock_get_monotonic_ns() - start_ns);
 
     gn_tiles_render(frame, renderer->pool);
+    if (is_cancelled(frame))
+        return gn_error_set(out_error, -ECANCELED, "render: the frame was cancelled");
     ret = frame->pass ? 0 : gn_caustics_add(&renderer->caustics, frame, renderer->pool);
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");

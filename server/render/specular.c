@@ -312,7 +312,7 @@ void gn_specular_shade(const struct frame *frame, struct scratch *scratch, int n
     // A grid's rays share the pixel's directions.
     int all = frame->options.paths_per_pixel;
     int n_directions = (DIRECTIONS * n_paths + all - 1) / all;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !is_cancelled(frame); i++) {
         struct sample *s = &scratch->samples[i];
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
             continue;

@@ -174,6 +174,8 @@ static void render_centres(void *context, int item, int worker)
     struct tile_figures *figures = &frame->figures[item];
     int pixels[BATCH][2];
     memset(figures, 0, sizeof(*figures));
+    if (is_cancelled(frame))
+        return;
     int64_t start = gn_clock_get_monotonic_ns();
     int n = see_tile(frame, scratch, item, pixels, figures);
     figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
@@ -315,7 +317,7 @@ static void render_edges(void *context, int item, int worker)
     int pixels[BATCH + 1][2];
     int edges[BATCH][2];
     int n_edges = 0;
-    int n = list_pixels(frame, item, pixels);
+    int n = is_cancelled(frame) ? 0 : list_pixels(frame, item, pixels);
     for (int i = 0; i < n; i++) {
         if (!gn_refine_is_needed(frame, pixels[i][0], pixels[i][1]))
             continue;

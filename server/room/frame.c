@@ -82,6 +82,14 @@ out:
     return rc;
 }
 
+void gn_frame_maker_cancel(struct gn_frame_maker *maker)
+{
+    if (!maker)
+        return;
+    gn_renderer_cancel(maker->renderer);
+    gn_still_cancel(maker->still);
+}
+
 void gn_frame_maker_destroy(struct gn_frame_maker **maker)
 {
     struct gn_frame_maker *m = *maker;

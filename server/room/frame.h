@@ -35,6 +35,9 @@ GN_MUST_USE int gn_frame_maker_create(const struct gn_room_options *options,
                                       const struct gn_scene *scene,
                                       struct gn_frame_maker **out_maker,
                                       struct gn_error *out_error);
+/** Ends the frame at hand, and all later ones, soon: they are dropped. NULL-safe. Thread-safety:
+ * safe, at any time until destroy. */
+void gn_frame_maker_cancel(struct gn_frame_maker *maker);
 /** NULL-safe; nulls *maker. */
 void gn_frame_maker_destroy(struct gn_frame_maker **maker);
 

@@ -114,6 +114,7 @@ void gn_room_destroy(struct gn_room **room)
     gn_cond_broadcast(&r->light_wake);
     gn_cond_broadcast(&r->render_wake);
     gn_mutex_unlock(&r->mu);
+    gn_frame_maker_cancel(r->maker);
     gn_thread_join(&r->light_thread);
     gn_thread_join(&r->render_thread);
     gn_probes_finish(&r->probes);

@@ -99,6 +99,11 @@ static void forget(struct seen *seen, int64_t now_ns)
     *seen = (struct seen){0};
 }
 
+void gn_still_cancel(struct gn_still *still)
+{
+    gn_renderer_cancel(still->renderer);
+}
+
 void gn_still_destroy(struct gn_still **still)
 {
     struct gn_still *s = *still;
@@ -157,8 +162,7 @@ static bool is_same_light(const struct gn_lighting_state *a, const struct gn_lig
     bool is_same = a->map == b->map && a->emission == b->emission && a->n_others == b->n_others &&
                    has_settled(a, b);
     for (int i = 0; i < a->n_others && is_same; i++)
-        is_same =
-            a->others[i]->map == b->others[i]->map && has_settled(a->others[i], b->others[i]);
+        is_same = a->others[i]->map == b->others[i]->map && has_settled(a->others[i], b->others[i]);
     return is_same;
 }
 

@@ -38,6 +38,8 @@ struct gn_still_view {
  */
 GN_MUST_USE int gn_still_create(const struct gn_scene *scene, struct gn_pool *pool,
                                 struct gn_still **out_still, struct gn_error *out_error);
+/** Ends a pass, and all later ones, soon. Thread-safety: safe, at any time until destroy. */
+void gn_still_cancel(struct gn_still *still);
 /** NULL-safe; nulls *still. */
 void gn_still_destroy(struct gn_still **still);
 /** As gn_renderer_set_scene: posed is borrowed until the next call, or destroy. */

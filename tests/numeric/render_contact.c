@@ -142,7 +142,7 @@ static void test_an_even_sky_is_half_hidden_at_the_contact(void **state)
             gn_test_stage_render(&stage, &options);
             worst[q] = get_worst(&stage, height);
         }
-        print_message("height %g m, pixel %g: off by %.4f, reference %.4f\n", height,
+        print_message("# height %g m, pixel %g: off by %.4f, reference %.4f\n", height,
                       pixels[i / 3] * height, worst[0], worst[1]);
         assert_true(worst[0] < 0.02);
         assert_true(worst[1] < 0.02);

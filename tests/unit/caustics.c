@@ -129,7 +129,7 @@ static void test_a_panel_throws_all_its_light_down(void **state)
     assert_true(n > 10);
     for (int k = 0; k < 3; k++) {
         double expected = grey[k] / M_PI * silver[k] * get_irradiance(&stage, k);
-        print_message("%d pixels: %.4f, expected %.4f\n", n, sums[k] / n, expected);
+        print_message("# %d pixels: %.4f, expected %.4f\n", n, sums[k] / n, expected);
         assert_float_equal(sums[k] / n / expected, 1, 0.005);
     }
     gn_test_stage_finish(&stage);
@@ -228,7 +228,7 @@ static void test_a_ball_of_glass_gathers_sunlight(void **state)
     }
     for (int j = 0; j < 2; j++) {
         double expected = get_irradiance(&stage, 0) * get_expected_flux(radii[j], 2);
-        print_message("within %.2f: %.4f W, expected %.4f W\n", radii[j], flux[j], expected);
+        print_message("# within %.2f: %.4f W, expected %.4f W\n", radii[j], flux[j], expected);
         assert_float_equal(flux[j] / expected, 1, 0.01);
     }
     gn_test_stage_finish(&stage);
@@ -280,7 +280,7 @@ static void test_a_mirror_shows_the_floor_a_lamp(void **state)
         }
     }
     for (int k = 0; k < 3; k++) {
-        print_message("%.4f, expected %.4f\n", sums[k], expected[k]);
+        print_message("# %.4f, expected %.4f\n", sums[k], expected[k]);
         assert_float_equal(sums[k] / expected[k], 1, 0.005);
     }
     gn_test_stage_finish(&stage);

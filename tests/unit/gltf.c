@@ -497,7 +497,7 @@ static void read_folder(const char *folder, int *n_read, int *n_refused)
         struct gn_mesh mesh = {0};
         struct gn_error error = {0};
         int ret = gn_mesh_read_file(path, &mesh, &error);
-        print_message("%s: %s\n", path,
+        print_message("# %s: %s\n", path,
                       ret < 0        ? error.text + strlen(path)
                       : mesh.ignored ? mesh.ignored
                                      : "read");

@@ -117,7 +117,7 @@ static void test_interactive_is_near_the_reference(void **state)
         for (int q = 0; q < 2; q++)
             means[q] = render_ball(cases[i].type, grey, cases[i].roughness, cases[i].metallic,
                                    q ? GN_QUALITY_REFERENCE : GN_QUALITY_INTERACTIVE, paint_sky);
-        print_message("type %d roughness %.1f: %.4f, reference %.4f\n", (int)cases[i].type,
+        print_message("# type %d roughness %.1f: %.4f, reference %.4f\n", (int)cases[i].type,
                       (double)cases[i].roughness, means[0], means[1]);
         assert_float_equal(means[0] / means[1], 1, cases[i].bound);
     }

@@ -2,14 +2,17 @@
 /* SPDX-License-Identifier: ISC */
 /* The reference against itself: grids of rays, bounces, partial maps; and the interactive quality
  * against it. */
+#include <errno.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
+#include "common/thread.h"
 #include "tests/meshes.h"
 #include "tests/stage.h"
 
@@ -258,6 +261,34 @@ static void test_a_coarse_constant_map_is_exact(void **state)
     gn_test_stage_finish(&stage);
 }
 
+/** A frame of hours. */
+static void render_for_hours(void *context)
+{
+    struct gn_test_stage *stage = context;
+    const struct gn_render_options options = {
+        .quality = GN_QUALITY_REFERENCE, .bounces = 16, .paths_per_pixel = 4096};
+    int ret = gn_renderer_render(stage->renderer, &stage->camera, &stage->state, &options,
+                                 &stage->layers, &stage->report, NULL);
+    stage->report.n_lights = -ret;
+}
+
+static void test_a_cancelled_frame_ends(void **state)
+{
+    (void)state;
+    struct gn_test_stage stage = {0};
+    struct gn_thread thread = {0};
+    init_ball(&stage, grey, 6);
+    gn_test_stage_set_map(&stage, 96, 48, paint_lamps, NULL);
+    gn_test_stage_aim(&stage, 640, 480, 540, (const double[]){0.6, -3, 1.6},
+                      (const double[]){0, 0, 0.3});
+    assert_int_equal(gn_thread_start(&thread, "render", render_for_hours, &stage), 0);
+    nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
+    gn_renderer_cancel(stage.renderer);
+    gn_thread_join(&thread); // or this test's time is over
+    assert_int_equal(stage.report.n_lights, ECANCELED);
+    gn_test_stage_finish(&stage);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -267,6 +298,7 @@ int main(void)
         cmocka_unit_test(test_a_coarse_constant_map_is_exact),
         cmocka_unit_test(test_white_furnace),
         cmocka_unit_test(test_many_lights_tend_to_the_reference),
+        cmocka_unit_test(test_a_cancelled_frame_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
