@@ -25,13 +25,15 @@ static void paint_white(void *context, const double dir[static 3], float out_rgb
 
 /** A ball over a floor under an even sky and one strong light, whose shadow has an edge; and a box,
  * real, beside it. */
-static void init_stage(struct gn_test_stage *stage, int n_threads)
+static void init_stage(struct gn_test_stage *stage, int n_threads, float emission)
 {
     const double eye[3] = {4, -1, 3};
     const double target[3] = {0, 0, 0};
     struct gn_light lights[N_LIGHTS] = {0};
     gn_test_stage_add(stage, GN_RT_REAL, gn_test_make_plane(6, 4), 0, 0, 0, GN_MATERIAL_DIFFUSE,
                       grey);
+    for (int k = 0; k < 3; k++)
+        stage->objects[0].emission[k] = emission;
     gn_test_stage_add(stage, GN_RT_REAL, gn_test_make_cube(0.3f), 0.9, 0.9, 0.3,
                       GN_MATERIAL_DIFFUSE, grey);
     gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.5f, 24), 0, 0, 0.5,
@@ -56,12 +58,65 @@ static size_t count_floats(void)
     return (size_t)WIDTH * HEIGHT * 3;
 }
 
+/** That stage with a floor that shines: what it sends itself is not cut. */
+struct shining {
+    struct gn_test_stage stage;
+    struct gn_emitters *emitters;
+    struct gn_emission *emission;
+    struct gn_lighting_state *light;
+};
+
+static void init_shining(struct shining *s)
+{
+    const struct gn_emitter_options options = {.n_pieces = 4};
+    init_stage(&s->stage, 2, 20);
+    assert_int_equal(gn_emitters_create(s->stage.scene, &options, &s->emitters, NULL), 0);
+    s->emission = gn_emitters_get_emission(s->emitters);
+    assert_int_equal(gn_lighting_state_create_dark(s->emission, NULL, 0, &s->light, NULL), 0);
+    s->stage.state.n_near = s->light->n_near;
+    s->stage.state.near = s->light->near;
+    s->stage.state.emission = s->light->emission;
+}
+
+static void finish_shining(struct shining *s)
+{
+    gn_lighting_state_unref(&s->light);
+    gn_emission_unref(&s->emission);
+    gn_emitters_destroy(&s->emitters);
+    gn_test_stage_finish(&s->stage);
+}
+
+static void test_coarse_shadow_on_what_shines(void **state)
+{
+    (void)state;
+    static float whole[WIDTH * HEIGHT * 3];
+    struct shining s = {0};
+    double largest = 0;
+    int n_changed = 0;
+    init_shining(&s);
+    struct gn_render_options options = {.single_ray = true};
+    gn_test_stage_render(&s.stage, &options);
+    memcpy(whole, s.stage.layers.shadow.data, sizeof(whole));
+    options.shadow_step = 2;
+    gn_test_stage_render(&s.stage, &options);
+    const float *coarse = s.stage.layers.shadow.data;
+    for (size_t i = 0; i < count_floats(); i++) {
+        largest = fmax(largest, fabs((double)coarse[i] - (double)whole[i]));
+        n_changed += coarse[i] < 1 && coarse[i] != whole[i];
+    }
+    print_message("# a floor that shines: off by %.4f at most, %d values of others\n", largest,
+                  n_changed);
+    assert_true(n_changed > 100);
+    assert_true(largest < 0.02);
+    finish_shining(&s);
+}
+
 static void test_coarse_shadow_is_near(void **state)
 {
     (void)state;
     static float whole[WIDTH * HEIGHT * 3];
     struct gn_test_stage stage = {0};
-    init_stage(&stage, 2);
+    init_stage(&stage, 2, 0);
     struct gn_render_options options = {.single_ray = true};
     gn_test_stage_render(&stage, &options);
     memcpy(whole, stage.layers.shadow.data, sizeof(whole));
@@ -104,7 +159,7 @@ static void test_threads_change_no_bit(void **state)
     const struct gn_render_options options = {.shadow_step = 2};
     for (int n_threads = 1; n_threads <= 3; n_threads += 2) {
         struct gn_test_stage stage = {0};
-        init_stage(&stage, n_threads);
+        init_stage(&stage, n_threads, 0);
         gn_test_stage_render(&stage, &options);
         if (n_threads == 1)
             memcpy(one, stage.layers.shadow.data, sizeof(one));
@@ -118,7 +173,7 @@ static void test_only_where_it_may(void **state)
     (void)state;
     static float whole[WIDTH * HEIGHT * 3];
     struct gn_test_stage stage = {0};
-    init_stage(&stage, 2);
+    init_stage(&stage, 2, 0);
     struct gn_render_options options = {.quality = GN_QUALITY_SEED};
     gn_test_stage_render(&stage, &options);
     memcpy(whole, stage.layers.shadow.data, sizeof(whole));
@@ -138,6 +193,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_coarse_shadow_is_near),
+        cmocka_unit_test(test_coarse_shadow_on_what_shines),
         cmocka_unit_test(test_threads_change_no_bit),
         cmocka_unit_test(test_only_where_it_may),
     };
