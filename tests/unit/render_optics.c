@@ -228,6 +228,43 @@ static void test_a_pane_shows_what_is_behind_it(void **state)
     gn_test_stage_finish(&direct);
 }
 
+/** Mean light that a rough pane adds by a ball on the camera's side of it, which is all it mirrors:
+ * some hundredths of what its facets are tried for. */
+static double get_glare(enum gn_quality quality)
+{
+    const struct gn_render_options options = {.quality = quality, .single_ray = true};
+    const double eye[3] = {3, 0, 0};
+    const double target[3] = {0, 0, 0};
+    struct gn_test_stage stage = {0};
+    double sum = 0;
+    gn_test_stage_add(&stage, GN_RT_REAL, gn_test_make_box(0.05f, 1, 1), -0.1, 0, 0,
+                      GN_MATERIAL_GLASS, white);
+    stage.objects[0].material.roughness = 0.3f;
+    gn_test_stage_add(&stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.6f, 24), 1.5, 1.2, 0,
+                      GN_MATERIAL_DIFFUSE, grey);
+    gn_test_stage_commit(&stage, 2);
+    gn_test_stage_set_map(&stage, 16, 8, paint_even, NULL);
+    gn_test_stage_set_lights_from_map(&stage, 2);
+    gn_test_stage_aim(&stage, 32, 24, 50, eye, target);
+    gn_test_stage_render(&stage, &options);
+    for (int i = 0; i < 32 * 24; i++) {
+        if (gn_image_at(&stage.layers.virtual_rgba, i % 32, i / 32)[3] == 0)
+            sum += (double)gn_image_at(&stage.layers.added, i % 32, i / 32)[1];
+    }
+    gn_test_stage_finish(&stage);
+    return sum / (32 * 24);
+}
+
+static void test_rough_glass_mirrors_a_little(void **state)
+{
+    (void)state;
+    double interactive = get_glare(GN_QUALITY_INTERACTIVE);
+    double reference = get_glare(GN_QUALITY_REFERENCE);
+    print_message("# glare %.6f, reference %.6f\n", interactive, reference);
+    assert_true(reference > 1e-4);
+    assert_float_equal(interactive / reference, 1, 0.2);
+}
+
 /** Where it mirrors what is black, a polished floor has the shadow of a plain one. */
 static void test_a_polished_floor_has_its_shadow(void **state)
 {
@@ -323,6 +360,7 @@ int main(void)
         cmocka_unit_test(test_a_mirror_shows_what_is_before_it),
         cmocka_unit_test(test_no_light_is_lost_or_won_under_even_light),
         cmocka_unit_test(test_a_pane_shows_what_is_behind_it),
+        cmocka_unit_test(test_rough_glass_mirrors_a_little),
         cmocka_unit_test(test_a_polished_floor_has_its_shadow),
         cmocka_unit_test(test_omissions_change_nothing),
         cmocka_unit_test(test_the_plan_says_why_not),
