@@ -1,0 +1,189 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/vision/markers.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <new>
+#include <vector>
+
+#include <opencv2/aruco.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+
+#include "client/vision/guard.hpp"
+#include "common/image.h"
+
+namespace {
+
+/* In the order of GN_MARKER_DICTIONARIES, which is OpenCV's own. */
+constexpr int n_dictionaries = cv::aruco::DICT_APRILTAG_36h11 + 1;
+
+bool is_dictionary(int dictionary)
+{
+    return dictionary >= 0 && dictionary < n_dictionaries;
+}
+
+cv::Ptr<cv::aruco::DetectorParameters> make_parameters(gn_marker_refinement refinement)
+{
+    cv::Ptr<cv::aruco::DetectorParameters> p = cv::aruco::DetectorParameters::create();
+    switch (refinement) {
+    case GN_MARKER_REFINE_NONE:
+        p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
+        break;
+    case GN_MARKER_REFINE_SUBPIX:
+        p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+        break;
+    case GN_MARKER_REFINE_CONTOUR:
+        p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_CONTOUR;
+        break;
+    case GN_MARKER_REFINE_APRILTAG:
+        p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_APRILTAG;
+        break;
+    }
+    return p;
+}
+
+} // namespace
+
+struct gn_marker_finder {
+    cv::Ptr<cv::aruco::Dictionary> dictionary;
+    cv::Ptr<cv::aruco::DetectorParameters> parameters;
+    std::vector<std::vector<cv::Point2f>> corners;
+    std::vector<int> ids;
+};
+
+const char *gn_vision_get_version(void)
+{
+    return "OpenCV " CV_VERSION;
+}
+
+bool gn_vision_is_built(void)
+{
+    return true;
+}
+
+int gn_marker_count_ids(int dictionary)
+{
+    int n = 0;
+    if (is_dictionary(dictionary))
+        (void)gn_vision_guard(nullptr, "the dictionary", [&] {
+            n = cv::aruco::getPredefinedDictionary(dictionary)->bytesList.rows;
+            return 0;
+        });
+    return n;
+}
+
+int gn_marker_finder_create(const struct gn_marker_finder_options *options,
+                            struct gn_marker_finder **out_finder, struct gn_error *out_error)
+{
+    *out_finder = nullptr;
+    const gn_marker_finder_options defaults = {};
+    const gn_marker_finder_options &o = options ? *options : defaults;
+    if (!is_dictionary(o.dictionary))
+        return gn_error_set(out_error, -EINVAL, "there is no marker dictionary %d", o.dictionary);
+    return gn_vision_guard(out_error, "the marker dictionary", [&] {
+        cv::setNumThreads(1);
+        auto finder = std::make_unique<gn_marker_finder>();
+        finder->dictionary = cv::aruco::getPredefinedDictionary(o.dictionary);
+        finder->parameters = make_parameters(o.refinement);
+        *out_finder = finder.release();
+        return 0;
+    });
+}
+
+void gn_marker_finder_destroy(struct gn_marker_finder **finder)
+{
+    delete *finder;
+    *finder = nullptr;
+}
+
+int gn_marker_finder_find(struct gn_marker_finder *finder, const uint8_t *grey, int width,
+                          int height, const struct gn_marker_window *window, int max_sightings,
+                          struct gn_marker_sighting *out_sightings, int *out_n_sightings,
+                          struct gn_error *out_error)
+{
+    if (width < 1 || height < 1 || width > GN_IMAGE_MAX_SIDE || height > GN_IMAGE_MAX_SIDE)
+        return gn_error_set(out_error, -EINVAL, "no picture to look for markers in: %dx%d", width,
+                            height);
+    return gn_vision_guard(out_error, "looking for markers", [&] {
+        // OpenCV only reads it, but knows no pictures of const pixels.
+        const cv::Mat picture(height, width, CV_8UC1, const_cast<uint8_t *>(grey));
+        cv::Rect all(0, 0, width, height), part = all;
+        if (window)
+            part &= cv::Rect(window->x, window->y, window->width, window->height);
+        *out_n_sightings = 0;
+        if (part.empty())
+            return 0;
+        finder->corners.clear();
+        finder->ids.clear();
+        cv::aruco::detectMarkers(picture(part), finder->dictionary, finder->corners, finder->ids,
+                                 finder->parameters);
+        int n = static_cast<int>(std::min<size_t>(finder->ids.size(), size_t(max_sightings)));
+        for (int i = 0; i < n; i++) {
+            out_sightings[i].id = finder->ids[size_t(i)];
+            for (size_t k = 0; k < 4; k++) {
+                const cv::Point2f &p = finder->corners[size_t(i)][k];
+                // OpenCV's pixel centres are at whole numbers.
+                out_sightings[i].corners[k][0] = double(p.x) + part.x + 0.5;
+                out_sightings[i].corners[k][1] = double(p.y) + part.y + 0.5;
+            }
+        }
+        *out_n_sightings = n;
+        return 0;
+    });
+}
+
+int gn_marker_get_cells(int dictionary, int id, uint8_t *out_cells)
+{
+    int side = 0;
+    if (!is_dictionary(dictionary) || id < 0 || id >= gn_marker_count_ids(dictionary))
+        return 0;
+    (void)gn_vision_guard(nullptr, "the marker's cells", [&] {
+        const auto d = cv::aruco::getPredefinedDictionary(dictionary);
+        int n = d->markerSize + 2;
+        if (n > GN_MARKER_MAX_CELLS)
+            return 0;
+        cv::Mat cells;
+        d->drawMarker(id, n, cells, 1);
+        for (int y = 0; y < n; y++)
+            for (int x = 0; x < n; x++)
+                out_cells[y * n + x] = cells.at<uchar>(y, x) > 127;
+        side = n;
+        return 0;
+    });
+    return side;
+}
+
+int gn_vision_solve_pose(const double *points_object, const double *rays, int n, bool is_planar,
+                         struct gn_vision_pose *out_poses, struct gn_error *out_error)
+{
+    if (n < 4 || n > 4096)
+        return gn_error_set(out_error, -EINVAL, "a pose needs 4 to 4096 points, not %d", n);
+    int n_poses = 0;
+    int err = gn_vision_guard(out_error, "finding a pose", [&] {
+        std::vector<cv::Point3d> points;
+        std::vector<cv::Point2d> seen;
+        for (int i = 0; i < n; i++) {
+            const double *p = points_object + 3 * i;
+            points.emplace_back(p[0], p[1], p[2]);
+            seen.emplace_back(rays[2 * i], rays[2 * i + 1]);
+        }
+        std::vector<cv::Mat> turns, shifts;
+        cv::solvePnPGeneric(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turns, shifts,
+                            false, is_planar ? cv::SOLVEPNP_IPPE : cv::SOLVEPNP_SQPNP);
+        size_t n_wanted = std::min<size_t>(turns.size(), is_planar ? 2 : 1);
+        for (size_t i = 0; i < n_wanted; i++) {
+            cv::Mat rotation;
+            cv::Rodrigues(turns[i], rotation);
+            gn_vision_pose &pose = out_poses[n_poses];
+            std::copy_n(rotation.ptr<double>(), 9, pose.rotation);
+            std::copy_n(shifts[i].ptr<double>(), 3, pose.translation);
+            // What is behind the camera is not seen.
+            n_poses +=
+                cv::checkRange(rotation) && cv::checkRange(shifts[i]) && pose.translation[2] > 0;
+        }
+        return 0;
+    });
+    return err ? err : n_poses;
+}
