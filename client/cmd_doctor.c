@@ -11,7 +11,9 @@
 #include <openexr.h>
 #include <png.h>
 
+#include "client/capture/gige.h"
 #include "client/cmd.h"
+#include "client/feature.h"
 #include "common/thread.h"
 #include "proto/attr.h"
 
@@ -79,6 +81,26 @@ static void check_libraries(void)
     say("ok", "libraries", text);
 }
 
+/** Every optional feature: built in, or what is missing. */
+static void check_features(void)
+{
+    for (int id = 0; id < GN_FEATURE_COUNT; id++) {
+        const struct gn_feature *f = gn_feature_get((enum gn_feature_id)id);
+        struct gn_error error = {0};
+        if (!f->is_built)
+            gn_feature_refuse((enum gn_feature_id)id, &error);
+        say(f->is_built ? "ok" : "no", f->name, f->is_built ? f->gives : error.text);
+    }
+}
+
+static void say_gige(void *context, const char *id, const char *model, const char *address)
+{
+    (void)context;
+    char text[512];
+    snprintf(text, sizeof(text), "%s: %s, at %s", id, model, address);
+    say("ok", "GigE", text);
+}
+
 static void check_cameras(void)
 {
     glob_t found = {0};
@@ -91,7 +113,8 @@ static void check_cameras(void)
         say("no", "V4L2", "no /dev/video* on this machine; this build cannot read V4L2");
     }
     globfree(&found);
-    say("no", "GigE", "this build cannot read GigE Vision cameras");
+    if (gn_gige_find(say_gige, NULL) == 0)
+        say("no", "GigE", "no GigE Vision camera answers in the networks of this machine");
     say("ok", "files", "EXR, Radiance, PNG, JPEG; sequences of the capture rig");
 }
 
@@ -108,6 +131,7 @@ int gn_cmd_doctor(int argc, char *const argv[])
     say("ok", "client", text);
     bool is_ok = check_server(options);
     check_libraries();
+    check_features();
     check_cameras();
     gn_options_destroy(&options);
     return is_ok ? 0 : 1;

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * gnomon probe: streams environment frames from files.
+ * gnomon probe: streams environment frames from files and cameras.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -16,6 +16,7 @@
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
     GN_REPLAY_OPTIONS,
+    GN_LIVE_OPTIONS,
     {.key = "setup",
      .flag = "setup",
      .type = GN_OPTION_STRING,
@@ -43,14 +44,15 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon probe",
-    .usage = "--sequence DIR | --files PATTERN [OPTION]...",
+    .usage = "--sequence DIR | --files PATTERN | --gige ID [OPTION]...",
     .summary =
         "Streams environment frames to a room: what a camera behind a fisheye or in front of "
         "a mirror ball sees of the light. The server makes the room's lighting state of the "
         "newest.",
     .notes = "Examples:\n"
              "  gnomon probe --files studio.exr --loop --rate 1\n"
-             "  gnomon probe --files 'fisheye/*.png' --setup fisheye.json --rate 15\n",
+             "  gnomon probe --files 'fisheye/*.png' --setup fisheye.json --rate 15\n"
+             "  gnomon probe --gige any --setup fisheye.json --exposure-us 8000\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
@@ -104,8 +106,12 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
     bool has_setup = gn_options_is_set(options, NULL, NULL, "setup");
     bool has_projection = gn_options_is_set(options, NULL, NULL, "projection");
-    if (has_dir == gn_options_is_set(options, NULL, NULL, "files"))
-        return "give --sequence DIR or --files PATTERN, one of them";
+    bool has_files = gn_options_is_set(options, NULL, NULL, "files");
+    const char *misuse = gn_replay_find_misuse(options);
+    if (misuse)
+        return misuse;
+    if (has_dir + has_files + gn_live_count_asked(options) != 1)
+        return "give --sequence DIR, --files PATTERN or a camera (--gige ID), one of them";
     if (has_dir + has_setup + has_projection > 1)
         return "the setup comes from --sequence, --setup or --projection, one of them";
     return NULL;
@@ -211,6 +217,7 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     const char *projection = gn_options_get_string(options, NULL, NULL, "projection");
     struct gn_sequence sequence = {0};
     struct gn_file_list list = {0};
+    bool is_live = gn_live_count_asked(options) > 0;
     int err = 0;
     gn_probe_setup_init(setup);
     if (dir) {
@@ -223,7 +230,7 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
             err = gn_probe_setup_read_file(setup_path, setup, out_error);
         else if (projection)
             err = gn_projection_from_name(projection, &setup->projection.type);
-        if (!err)
+        if (!err && !is_live)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
     }
     gn_sequence_finish(&sequence);
@@ -231,7 +238,11 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     p->first_sequence = (uint64_t)gn_options_get_int(options, NULL, NULL, "first-sequence");
     const struct gn_file_source_options source_options = {
         .is_looped = r->is_looped, .is_12_bit = setup->is_12_bit, .is_8_bit_16 = true};
-    if (!err)
+    const struct gn_live_options wanted = {.width = setup->projection.width,
+                                           .height = setup->projection.height};
+    if (!err && is_live)
+        err = gn_live_open(options, &wanted, &r->source, out_error);
+    else if (!err)
         err = gn_replay_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);
     return err;
@@ -252,7 +263,7 @@ static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
     double setup_scale = p->setup.response.scale == 0 ? 1 : p->setup.response.scale;
     p->frame.scale = setup_scale * pixels.scale;
     p->frame.sequence = p->first_sequence + (uint64_t)r->n_sent;
-    p->frame.capture_time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
+    p->frame.capture_time_ns = gn_replay_get_capture_ns(r, capture);
     p->frame.width = (uint32_t)capture->width;
     p->frame.height = (uint32_t)capture->height;
     p->frame.pixel_format = pixels.format;

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * gnomon view: streams camera frames and poses from files, writes what comes back.
+ * gnomon view: streams camera frames and poses from files and cameras, writes what comes back.
  */
 #include <errno.h>
 #include <math.h>
@@ -27,12 +27,14 @@
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
     GN_REPLAY_OPTIONS,
+    GN_LIVE_OPTIONS,
     {.key = "camera",
      .flag = "camera",
      .type = GN_OPTION_STRING,
      .value_name = "FILE",
-     .help = "With --files: camera.json with intrinsics and the pose of a camera at rest "
-             "(docs/frames.md). A sequence brings its own."},
+     .help =
+         "With --files or a camera: camera.json with intrinsics and the pose of a camera at rest "
+         "(docs/frames.md). A sequence brings its own."},
     {.key = "out",
      .flag = "out",
      .type = GN_OPTION_STRING,
@@ -96,13 +98,15 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon view",
-    .usage = "--sequence DIR | --files PATTERN --camera FILE, --out DIR [OPTION]...",
+    .usage = "--sequence DIR | {--files PATTERN | --gige ID} --camera FILE, --out DIR "
+             "[OPTION]...",
     .summary = "Streams camera frames and poses to a room and writes the composited frames that "
                "come back, with their receipts. Every frame comes back exactly once, as a result "
                "or as dropped with the reason. At the start it waits up to 5 s for light.",
     .notes = "Examples:\n"
              "  gnomon view --sequence .cache/rig/lamps --out composites\n"
-             "  gnomon view --files 'shots/*.jpg' --camera camera.json --out composites\n",
+             "  gnomon view --files 'shots/*.jpg' --camera camera.json --out composites\n"
+             "  gnomon view --gige any --camera camera.json --out composites\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
@@ -136,8 +140,12 @@ static const char *find_misuse(const struct gn_options *options)
 {
     bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
-    if (has_dir == has_files || has_files != gn_options_is_set(options, NULL, NULL, "camera"))
-        return "give --sequence DIR, or --files PATTERN with --camera FILE";
+    bool has_camera = gn_options_is_set(options, NULL, NULL, "camera");
+    const char *misuse = gn_replay_find_misuse(options);
+    if (misuse)
+        return misuse;
+    if (has_dir + has_files + gn_live_count_asked(options) != 1 || has_dir == has_camera)
+        return "give --sequence DIR, or --files PATTERN or a camera (--gige ID) with --camera FILE";
     if (gn_options_get_double(options, NULL, NULL, "budget-ms") > 0 &&
         gn_options_get_enum(options, NULL, NULL, "quality") != 0)
         return "--budget-ms is for --quality interactive: the others' settings are not chosen";
@@ -294,14 +302,16 @@ static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
     struct pending *p = find_pending(v, 0);
     struct gn_msg_frame frame = v->frame;
     frame.id = (uint64_t)r->n_sent + 1;
-    frame.capture_time_ns = gn_client_to_server_ns(r->client, gn_client_now_ns());
+    frame.capture_time_ns = gn_replay_get_capture_ns(r, capture);
     frame.views_count = 1;
     frame.views[0] = (struct gn_msg_frame_view){
         .has_world_from_camera = true,
         .picture_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
         .payload_length = (uint32_t)capture->data_bytes,
     };
-    gn_cmd_make_transform(&capture->world_from_camera, &frame.views[0].world_from_camera);
+    gn_cmd_make_transform(capture->has_pose ? &capture->world_from_camera
+                                            : &v->camera.world_from_camera,
+                          &frame.views[0].world_from_camera);
     set_light_wanted(v, &frame);
     *p = (struct pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
@@ -311,6 +321,13 @@ static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
     r->n_sent++;
     v->n_outstanding++;
     return 0;
+}
+
+/** So that the picture that is read then is the newest when it is sent. */
+static int wait_for_room(struct gn_replay *r, struct gn_error *out_error)
+{
+    struct view *v = (struct view *)r;
+    return serve(v, 0, v->max_outstanding - 1, out_error);
 }
 
 static int wait_for_answers(struct gn_replay *r, struct gn_error *out_error)
@@ -342,6 +359,7 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
     struct gn_sequence sequence = {0};
     struct gn_file_list list = {0};
+    bool is_live = gn_live_count_asked(options) > 0;
     int err;
     if (dir) {
         err = gn_sequence_read(dir, &sequence, out_error);
@@ -350,18 +368,18 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
         memset(&sequence.pictures, 0, sizeof(sequence.pictures));
     } else {
         err = gn_camera_read_file(camera_path, &v->camera, out_error);
-        if (!err)
+        if (!err && !is_live)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
-        for (int i = 0; i < list.n_entries; i++) {
-            list.entries[i].has_pose = true;
-            list.entries[i].world_from_camera = v->camera.world_from_camera;
-        }
     }
     gn_match_keep(gn_options_get_set(options, NULL, NULL, "match"), &v->camera);
     gn_sequence_finish(&sequence);
     v->dir = gn_options_get_string(options, NULL, NULL, "out");
     set_frame_options(v, options);
     const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
+    const struct gn_live_options wanted = {
+        .is_8_bit = true, .width = v->camera.width, .height = v->camera.height};
+    if (!err && is_live)
+        return gn_live_open(options, &wanted, &r->source, out_error);
     if (!err)
         err = gn_file_list_check_names(&list, out_error);
     if (!err)
@@ -386,7 +404,10 @@ static int report(struct gn_replay *r, int err, const struct gn_error *error)
         err = gn_error_set(&drop_error, -ENODATA, "no frame was rendered: %s", v->last_drop);
         error = &drop_error;
     }
-    int record_err = gn_record_close(&v->record, r->n_sent, r->is_complete, &record_error);
+    struct gn_source_counts counts;
+    gn_source_get_counts(r->source, &counts);
+    int record_err = gn_record_close(&v->record, r->n_sent, r->is_complete,
+                                     r->source->is_live ? &counts : NULL, &record_error);
     if (err || record_err)
         gn_cmd_fail(&program, err ? error->text : record_error.text);
     printf("%ld frames sent, %ld results, %ld dropped", r->n_sent, v->n_results, v->n_dropped);
@@ -407,6 +428,7 @@ int gn_cmd_view(int argc, char *const argv[])
         .find_misuse = find_misuse,
         .open = open_source,
         .begin = begin,
+        .serve = wait_for_room,
         .send = send_frame,
         .end = wait_for_answers,
         .report = report,

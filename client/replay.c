@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <poll.h>
 #include <stdio.h>
 
 #include "common/clock.h"
@@ -14,6 +15,15 @@
 #define LAST_WORDS_NS (200 * GN_NS_PER_MS)
 /** Pictures per second where neither the files nor --rate say. */
 #define DEFAULT_RATE_HZ 10.0
+
+const char *gn_replay_find_misuse(const struct gn_options *options)
+{
+    if (gn_live_count_asked(options) > 0 && (gn_options_is_set(options, NULL, NULL, "rate") ||
+                                             gn_options_is_set(options, NULL, NULL, "start-at") ||
+                                             gn_options_get_bool(options, NULL, NULL, "loop")))
+        return "--rate, --start-at and --loop are for recordings; a camera has --frame-rate";
+    return gn_live_find_misuse(options);
+}
 
 int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
                          const struct gn_file_source_options *options, struct gn_error *out_error)
@@ -38,8 +48,16 @@ static void read_pace(struct gn_replay *r, const struct gn_options *options, boo
     r->n_wanted = gn_options_get_int(options, NULL, NULL, "count");
 }
 
+int64_t gn_replay_get_capture_ns(const struct gn_replay *r, const struct gn_capture *capture)
+{
+    return gn_client_to_server_ns(r->client,
+                                  capture->time_ns ? capture->time_ns : gn_client_now_ns());
+}
+
 int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture)
 {
+    if (r->source && r->source->is_live)
+        return gn_clock_get_monotonic_ns();
     double since_start_s = r->rate_hz > 0 ? (double)r->n_sent / r->rate_hz : capture->time_s;
     int64_t since_start_ns = (int64_t)llround(since_start_s * 1e9);
     int64_t now_ns = gn_clock_get_monotonic_ns();
@@ -113,12 +131,41 @@ int gn_replay_wait_last(struct gn_replay *r, struct gn_error *out_error)
     return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
 }
 
+/** Until the camera or the server has something, for GN_SOURCE_WAIT_MS at most. */
+static void wait_for_either(const struct gn_replay *r)
+{
+    if (r->source->fd < 0)
+        return; // reading waits
+    struct pollfd fds[] = {{.fd = gn_client_get_fd(r->client), .events = POLLIN},
+                           {.fd = r->source->fd, .events = POLLIN}};
+    (void)!poll(fds, 2, GN_SOURCE_WAIT_MS); // a signal is seen by who serves
+}
+
+/** Serves the connection and reads the camera until it has a picture. As gn_source_read. */
+static int read_live(const struct gn_replay_command *command, struct gn_replay *r,
+                     struct gn_capture *out, struct gn_error *out_error)
+{
+    for (;;) {
+        int err = command->serve ? command->serve(r, out_error)
+                                 : serve_until(r, gn_clock_get_monotonic_ns(), out_error);
+        if (err)
+            return err;
+        int got = gn_source_read(r->source, out, out_error);
+        if (got != -EAGAIN)
+            return got;
+        if (out_error->text[0])
+            gn_cmd_fail(r->program, out_error->text);
+        wait_for_either(r);
+    }
+}
+
 static int stream(const struct gn_replay_command *command, struct gn_replay *r,
                   struct gn_error *out_error)
 {
     while (!r->n_wanted || r->n_sent < r->n_wanted) {
         struct gn_capture capture;
-        int got = gn_source_read(r->source, &capture, out_error);
+        int got = r->source->is_live ? read_live(command, r, &capture, out_error)
+                                     : gn_source_read(r->source, &capture, out_error);
         if (got < 0)
             return got;
         if (got == 0)
@@ -135,10 +182,14 @@ static int run(const struct gn_replay_command *command, struct gn_replay *r)
 {
     struct gn_error error = {0};
     int err = stream(command, r, &error);
-    r->is_complete = !err;
-    if (err == -EINTR) // the only way to end a loop
-        err = r->is_looped ? 0 : gn_error_set(&error, err, "interrupted");
-    return command->report(r, err, &error);
+    bool is_live = r->source->is_live;
+    r->is_complete = !err || (err == -EINTR && is_live);
+    if (err == -EINTR) // the only way to end a loop or a camera
+        err = r->is_looped || is_live ? 0 : gn_error_set(&error, err, "interrupted");
+    int status = command->report(r, err, &error);
+    if (is_live)
+        gn_live_print_counts(r->source, stdout);
+    return status;
 }
 
 int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,

@@ -2,7 +2,8 @@
 /* SPDX-License-Identifier: ISC */
 /*
  * What the commands share that send picture after picture: their options, when each picture is due,
- * the way from the command line to the exit status.
+ * the way from the command line to the exit status. Pictures of a live source are not paced: each
+ * is sent when it comes, and the newest wins.
  */
 #ifndef GN_CLIENT_REPLAY_H
 #define GN_CLIENT_REPLAY_H
@@ -12,6 +13,7 @@
 
 #include "client/capture/file.h"
 #include "client/cmd.h"
+#include "client/live.h"
 
 /** Rows of the option table that every command which replays recordings has. */
 #define GN_REPLAY_OPTIONS                                                                          \
@@ -85,6 +87,12 @@ struct gn_replay_command {
     int (*open)(struct gn_replay *r, const struct gn_options *options, struct gn_error *out_error);
     /** The first messages, once connected; NULL: none. */
     int (*begin)(struct gn_replay *r, struct gn_error *out_error);
+    /**
+     * Before a live source is read: takes what the server has said, and waits until another picture
+     * may be sent. -EINTR: Ctrl-C. NULL: all pictures may be sent at once, and nothing but trouble
+     * is expected.
+     */
+    int (*serve)(struct gn_replay *r, struct gn_error *out_error);
     /** Waits until the picture is due, sends it and counts it. */
     int (*send)(struct gn_replay *r, const struct gn_capture *capture, struct gn_error *out_error);
     /** Waits for the server's last words; NULL: for 200 ms. */
@@ -97,15 +105,22 @@ struct gn_replay_command {
 int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,
                   char *const argv[]);
 
+/** What is wrong with the options of GN_REPLAY_OPTIONS and GN_LIVE_OPTIONS together; NULL: nothing
+ * but that there may be no source, or several. */
+const char *gn_replay_find_misuse(const struct gn_options *options);
+
 /** Opens the files as the replay's source. Returns 0, or -ENOMEM and a sentence. */
 GN_MUST_USE int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
                                      const struct gn_file_source_options *options,
                                      struct gn_error *out_error);
 
+/** When the picture was taken, in the server's clock: a recording's is taken when it is sent. */
+int64_t gn_replay_get_capture_ns(const struct gn_replay *r, const struct gn_capture *capture);
+
 /**
- * When the next picture is due, own monotonic clock. Without --start-at the first is due now. A
- * first picture that is late at all, and a later one that is more than 2 s late, is due now and
- * shifts all that follow, so that nothing bursts.
+ * When the next picture is due, own monotonic clock; a live source's is due at once. Without
+ * --start-at the first is due now. A first picture that is late at all, and a later one that is
+ * more than 2 s late, is due now and shifts all that follow, so that nothing bursts.
  */
 int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture);
 

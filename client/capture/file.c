@@ -211,7 +211,7 @@ int gn_file_source_open(struct gn_file_list *list, const struct gn_file_source_o
     struct file_source *s = calloc(1, sizeof(*s));
     if (!s)
         return -ENOMEM;
-    s->head.ops = &file_ops;
+    s->head = (struct gn_source){.ops = &file_ops, .fd = -1};
     if (options)
         s->options = *options;
     s->list = *list;

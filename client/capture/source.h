@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
 /*
- * Where pictures come from: one interface, one file per kind of source (file.c; cameras follow).
- * A source gives camera frames or environment frames; which of the two its pictures are is its
+ * Where pictures come from: one interface, one file per kind of source. Recordings (file.c) give
+ * every picture in turn, and who reads them paces them. Live sources (cameras) give the newest and
+ * count what they left out. Whether pictures are camera frames or environment frames is their
  * user's business.
  */
 #ifndef GN_CLIENT_CAPTURE_SOURCE_H
@@ -15,6 +16,11 @@
 #include "common/error.h"
 #include "common/pose.h"
 #include "proto/attr.h"
+
+/** Longest wait of gn_source_read for a live source, ms. */
+#define GN_SOURCE_WAIT_MS 50
+/** A live source without a whole picture for so many frame times opens its camera again. */
+#define GN_SOURCE_MISSING_FRAMES 5
 
 /** How the pixels of a capture lie in memory: rows from the top, no padding, little-endian. */
 enum gn_capture_format {
@@ -30,7 +36,8 @@ enum gn_capture_format {
 /** One picture. */
 struct gn_capture {
     const char *name; // what files written about it are called; borrowed until the next read
-    double time_s;    // since the source's first picture
+    double time_s;    // recordings: since the source's first picture
+    int64_t time_ns;  // live: when it was taken, CLOCK_MONOTONIC; 0 in recordings
     int width;        // px
     int height;       // px
     enum gn_capture_format format;
@@ -40,25 +47,59 @@ struct gn_capture {
     struct gn_pose world_from_camera;
 };
 
+/** What a live source has counted since it was opened. */
+struct gn_source_counts {
+    uint64_t n_complete;       // whole pictures that came from the camera
+    uint64_t n_incomplete;     // pictures with parts missing: never given out
+    uint64_t n_skipped;        // whole pictures that a newer one replaced before they were read
+    uint64_t n_lost_packets;   // that never came
+    uint64_t n_resent_packets; // that came when asked for again
+    uint64_t n_reopened;       // times the camera came back
+    uint64_t n_read;           // pictures given out
+    uint64_t read_bytes;       // of `data` of these
+    uint64_t copied_bytes;     // of these, how many we wrote: once each, or not at all
+};
+
 struct gn_source;
 
 /** What a kind of source does; see the functions below. */
 struct gn_source_ops {
     int (*read)(struct gn_source *source, struct gn_capture *out, struct gn_error *out_error);
+    void (*get_counts)(const struct gn_source *source, struct gn_source_counts *out); // or NULL
     void (*close)(struct gn_source *source);
 };
 
 /** Head of every kind's own struct. Thread-safety: unsafe. */
 struct gn_source {
     const struct gn_source_ops *ops;
+    bool is_live;
+    int fd; // live: poll() finds it readable when a read may have something; -1: read now and then
+};
+
+/** What is asked of a camera; all-zero leaves it as it is. Strings are borrowed for the opening
+ * call. */
+struct gn_live_options {
+    const char *id;    // which camera, as its kind names them
+    bool is_8_bit;     // give RGB8 or JPEG: what camera frames are on the wire; default: all bits
+    int width, height; // px; 0: as it is
+    double frame_rate_hz;
+    double exposure_us; // > 0: fixed, automatic exposure off
+    bool has_gain;
+    double gain;              // in the camera's own unit, dB with GenICam; automatic gain off
+    const char *pixel_format; // the camera's own name; NULL: the best that we can read
 };
 
 /**
- * The next picture. Returns 1, 0 at the end, or a negative errno and a sentence. May block until a
- * camera has one.
+ * The next picture. Returns 1, 0 at the end, or a negative errno and a sentence. A recording blocks
+ * until it has read it. A live source gives the newest whole picture; where there is none within
+ * GN_SOURCE_WAIT_MS it returns -EAGAIN, and *out_error then holds one line of news (the camera is
+ * lost, or back again), each once, or "". Any other error of a live source is final.
  */
 GN_MUST_USE int gn_source_read(struct gn_source *source, struct gn_capture *out,
                                struct gn_error *out_error);
+
+/** What a live source has counted; zeros for recordings. */
+void gn_source_get_counts(const struct gn_source *source, struct gn_source_counts *out);
 
 /** NULL-safe; nulls *source. */
 void gn_source_close(struct gn_source **source);

@@ -3,6 +3,7 @@
 #include "client/view/record.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -205,16 +206,32 @@ int gn_record_add_dropped(struct gn_record *record, const char *name,
     return err;
 }
 
+/** As snprintf. */
+static int print_counts(char *text, size_t size, const struct gn_source_counts *c)
+{
+    return snprintf(text, size,
+                    "\"capture\": {\"complete\": %" PRIu64 ", \"incomplete\": %" PRIu64
+                    ", \"skipped\": %" PRIu64 ", \"lost_packets\": %" PRIu64
+                    ", \"resent_packets\": %" PRIu64 ", \"reopened\": %" PRIu64
+                    ", \"read\": %" PRIu64 ", \"read_bytes\": %" PRIu64
+                    ", \"copied_bytes\": %" PRIu64 "},\n",
+                    c->n_complete, c->n_incomplete, c->n_skipped, c->n_lost_packets,
+                    c->n_resent_packets, c->n_reopened, c->n_read, c->read_bytes, c->copied_bytes);
+}
+
 int gn_record_close(struct gn_record **record, long n_sent, bool is_complete,
-                    struct gn_error *out_error)
+                    const struct gn_source_counts *counts, struct gn_error *out_error)
 {
     struct gn_record *r = *record;
     *record = NULL;
     if (!r)
         return 0;
-    char tail[256];
-    snprintf(tail, sizeof(tail),
-             "],\n\"sent\": %ld, \"results\": %ld, \"dropped\": %ld, \"complete\": %s}\n", n_sent,
+    char tail[1024];
+    int n = snprintf(tail, sizeof(tail), "],\n");
+    if (counts)
+        n += print_counts(tail + n, sizeof(tail) - (size_t)n, counts);
+    snprintf(tail + n, sizeof(tail) - (size_t)n,
+             "\"sent\": %ld, \"results\": %ld, \"dropped\": %ld, \"complete\": %s}\n", n_sent,
              r->n_results, r->n_dropped, is_complete ? "true" : "false");
     int err = put(r, tail, out_error);
     if (err)

@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "client/capture/source.h"
 #include "client/lib/gnomon.h"
 #include "common/error.h"
 #include "proto/attr.h"
@@ -37,10 +38,11 @@ GN_MUST_USE int gn_record_add_dropped(struct gn_record *record, const char *name
                                       struct gn_error *out_error);
 
 /**
- * Completes view.json and frees. n_sent frames were sent; is_complete: the replay came to its end.
+ * Completes view.json and frees. n_sent frames were sent; is_complete: the replay came to its end;
+ * counts: of a live source, or NULL.
  * NULL-safe; nulls *record. Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_record_close(struct gn_record **record, long n_sent, bool is_complete,
-                                struct gn_error *out_error);
+                                const struct gn_source_counts *counts, struct gn_error *out_error);
 
 #endif

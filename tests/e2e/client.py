@@ -424,7 +424,8 @@ def test_doctor():
     with Daemon() as daemon:
         out = Run('doctor', server(daemon)).succeed()
         assert 'FAILED' not in out
-        for word in ("room 'demo'", 'protocol 1', 'round trip', '1920x1200', 'OpenEXR'):
+        for word in ("room 'demo'", 'protocol 1', 'round trip', '1920x1200', 'OpenEXR', 'gige',
+                     'v4l2', 'video', 'vision', 'window'):
             assert word in out, out
         page = daemon.http_address
         for where, word in (('127.0.0.1:%d' % page[1], 'not that of its page'),
@@ -439,13 +440,17 @@ def test_usage():
     """Wrong command lines: status 2, one line that says what is right."""
     for arguments, words in (
             (['probes'], ["did you mean 'probe'"]), (['fly'], ['--help lists them']),
-            (['probe'], ['--sequence DIR or --files PATTERN']),
+            (['probe'], ['--sequence DIR, --files PATTERN or a camera']),
             (['probe', '--files', 'a', '--sequence', 'b'], ['one of them']),
             (['probe', '--files', 'a', '--setup', 'b', '--projection', 'angular'], ['one of them']),
             (['probe', '--files', 'a', '--rate', '0'], ['--rate', '0.001']),
             (['probe', '--files', 'a', '--start-at', '1e12'], ['--start-at']),
             (['probe', '--files', 'a', '--projection', 'square'], ['latlong, angular']),
+            (['probe', '--files', 'a', '--gige', 'any'], ['one of them']),
+            (['probe', '--gige', 'any', '--rate', '5'], ['--frame-rate']),
+            (['probe', '--files', 'a', '--frame-size', '4x4'], ['for cameras']),
             (['view', '--files', 'a', '--out', 'o'], ['--camera FILE']),
+            (['view', '--gige', 'any', '--out', 'o'], ['--camera FILE']),
             (['view', '--sequence', 'a', '--camera', 'c', '--out', 'o'], ['--camera FILE']),
             (['view', '--sequence', 'a'], ['--out']),
             (['view', '--sequence', 'a', '--out', 'o', '--outstanding', '17'], ['[1, 16]']),
@@ -453,6 +458,9 @@ def test_usage():
             (['doctor', '--server', 'nowhere'], ['--server'])):
         Run(*arguments).fail(2, *words)
     Run('probe', '--files', sys.argv[0], '--server', '127.0.0.1:0').fail(1, '[1, 65535]')
+    for size in ('640', '640x', 'x480', '0x480', '640x480x3', '99999x480'):
+        Run('probe', '--gige', 'any', '--frame-size', size).fail(1, '--frame-size %s: ' % size,
+                                                                 '640x480')
     status, _, err = Run().end()
     assert status == 2 and 'usage: gnomon' in err
     with open('/dev/full', 'w') as full:

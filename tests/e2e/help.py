@@ -11,13 +11,15 @@ import sys
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 CONNECT = {'server', 'room', 'token'}
 REPLAY = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
+LIVE = {'gige', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
-    ([GNOMON, 'probe'], CONNECT | REPLAY | {'setup', 'projection', 'first-sequence'}),
+    ([GNOMON, 'probe'], CONNECT | REPLAY | LIVE | {'setup', 'projection', 'first-sequence'}),
     ([GNOMON, 'track'], CONNECT | {'object', 'poses', 'orbit', 'rate', 'count'}),
     ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
-    ([GNOMON, 'view'], CONNECT | REPLAY | {'camera', 'out', 'result', 'jpeg-quality', 'quality',
-                                           'budget-ms', 'outstanding', 'match', 'sync-light'}),
+    ([GNOMON, 'view'], CONNECT | REPLAY | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
+                                                  'quality', 'budget-ms', 'outstanding',
+                                                  'match', 'sync-light'}),
     ([GNOMON, 'doctor'], CONNECT),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
     ([RENDER], {'scene', 'env', 'env-projection', 'env-params', 'world-from-env', 'camera',

@@ -83,9 +83,18 @@ static void test_run(void **state)
     strcpy(dropped.sentence, "a later frame came");
     assert_int_equal(gn_record_add_dropped(record, "b\xff", &dropped, NULL), 0);
     assert_int_not_equal(access(report, F_OK), 0); // whole or absent
-    assert_int_equal(gn_record_close(&record, 3, false, NULL), 0);
+    const struct gn_source_counts counts = {.n_complete = 1,
+                                            .n_incomplete = 2,
+                                            .n_skipped = 3,
+                                            .n_lost_packets = 4,
+                                            .n_resent_packets = 5,
+                                            .n_reopened = 6,
+                                            .n_read = 7,
+                                            .read_bytes = UINT64_C(8) << 40,
+                                            .copied_bytes = 9};
+    assert_int_equal(gn_record_close(&record, 3, false, &counts, NULL), 0);
     assert_null(record);
-    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+    assert_int_equal(gn_record_close(&record, 0, true, NULL, NULL), 0);
 
     struct gn_image_file file;
     assert_int_equal(gn_image_read_file("unit_record.tmp/a.png", &file, NULL), 0);
@@ -112,6 +121,13 @@ static void test_run(void **state)
     assert_string_equal(json_string_value(json_object_get(left_out, "why")), "not ? UTF-8");
     assert_string_equal(json_string_value(json_object_get(b, "name")), "b?");
     assert_string_equal(json_string_value(json_object_get(b, "sentence")), "a later frame came");
+    const json_t *capture = json_object_get(root, "capture");
+    static const char *const keys[] = {"complete",       "incomplete", "skipped", "lost_packets",
+                                       "resent_packets", "reopened",   "read"};
+    for (int i = 0; i < 7; i++)
+        assert_int_equal(get_int(capture, keys[i]), i + 1);
+    assert_true(get_int(capture, "read_bytes") == INT64_C(8) << 40);
+    assert_int_equal(get_int(capture, "copied_bytes"), 9);
     json_decref(root);
 }
 
@@ -119,14 +135,14 @@ static void test_empty_and_again(void **state)
 {
     (void)state;
     struct gn_record *record = open_record();
-    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+    assert_int_equal(gn_record_close(&record, 0, true, NULL, NULL), 0);
     json_t *root = load();
     assert_int_equal(json_array_size(json_object_get(root, "frames")), 0);
     assert_true(json_is_true(json_object_get(root, "complete")));
     json_decref(root);
     record = open_record(); // the old report is gone while the new run lasts
     assert_int_not_equal(access(report, F_OK), 0);
-    assert_int_equal(gn_record_close(&record, 0, true, NULL), 0);
+    assert_int_equal(gn_record_close(&record, 0, true, NULL, NULL), 0);
     assert_int_equal(access(report, F_OK), 0);
 }
 
@@ -145,7 +161,7 @@ static void test_jpeg(void **state)
     assert_int_equal(n, sizeof(bytes));
     assert_memory_equal(data, bytes, n);
     free(data);
-    assert_int_equal(gn_record_close(&record, 1, true, NULL), 0);
+    assert_int_equal(gn_record_close(&record, 1, true, NULL, NULL), 0);
 }
 
 static void test_refusals(void **state)
@@ -163,7 +179,7 @@ static void test_refusals(void **state)
     result = make_result(1);
     assert_int_equal(gn_record_add_result(record, "no/such", &result, pixels, 1, &error), -ENOENT);
     assert_non_null(strstr(error.text, "no/such.png"));
-    assert_int_equal(gn_record_close(&record, 1, true, &error), 0);
+    assert_int_equal(gn_record_close(&record, 1, true, NULL, &error), 0);
     json_t *root = load(); // what was refused is not in it
     assert_int_equal(json_array_size(json_object_get(root, "frames")), 0);
     json_decref(root);
