@@ -135,7 +135,7 @@ static bool make_splat(const struct photon_job *job, const struct photon *photon
     double cosine = dot_double(surface->normal_geometric, dir);
     double angle = get_pixel_angle(frame->camera, xy[0], xy[1]);
     if (!(cosine > 0) || !(angle > 0) ||
-        gn_rt_is_occluded(frame->rt, GN_RT_ALL, org, dir, 0, (float)distance))
+        gn_rt_is_occluded(frame->rt, frame->seen, org, dir, 0, (float)distance))
         return false;
     out->pixel = (uint32_t)xy[1] * (uint32_t)frame->camera->width + (uint32_t)xy[0];
     for (int k = 0; k < 3; k++)

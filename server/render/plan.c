@@ -93,8 +93,15 @@ static bool has_virtual(const struct frame *frame, unsigned types)
     return (frame->scene->virtual_materials & types) != 0;
 }
 
+static const char *const not_asked_for = "not asked for";
+
+/** Only what needs proof is left to all_passes; what was not asked for is not done. */
 static const char *why_not_virtual(const struct frame *frame, const double slopes[static 4])
 {
+    if (frame->options.no_virtual)
+        return not_asked_for;
+    if (frame->options.all_passes)
+        return NULL;
     if (!frame->has_virtual)
         return "the scene has no virtual object";
     if (!is_box_in_view(frame, &frame->virtual_box, slopes))
@@ -152,6 +159,8 @@ static const char *why_not_optics(const struct frame *frame)
         return "the scene has no virtual object";
     if (!gn_optics_is_needed(frame->scene))
         return "no mirror or glass among the real objects";
+    if (frame->options.no_virtual)
+        return not_asked_for;
     return NULL;
 }
 
@@ -206,6 +215,7 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     bool all = options->all_passes;
     frame->cull = !all;
     frame->run_bounces = options->bounces > 0;
+    frame->seen = options->no_virtual ? GN_RT_REAL : GN_RT_ALL;
     report->n_plan = N_LINES;
     set_line(report, PRIMARY, NULL, "one ray through each pixel's centre");
     set_line(report, REFINE,
@@ -214,7 +224,7 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
                                    : "this quality has one ray for each pixel",
              "edges get a grid of rays");
 
-    const char *no_virtual = all ? NULL : why_not_virtual(frame, slopes);
+    const char *no_virtual = why_not_virtual(frame, slopes);
     const char *no_loop = why_not_light_loop(frame);
     frame->run_light_loop = !no_virtual && !no_loop;
     set_line(report, SHADE, no_virtual ? no_virtual : no_loop, "virtual objects may be in view");
@@ -227,9 +237,7 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
              has_glossy ? no_virtual : "neither ggx nor glass among the virtual objects",
              "ggx or glass among the virtual objects");
 
-    const char *no_shadow = options->no_shadow ? "not asked for"
-                            : all              ? NULL
-                                               : why_not_shadow(frame);
+    const char *no_shadow = options->no_shadow ? not_asked_for : all ? NULL : why_not_shadow(frame);
     const char *no_blockers = why_not_blockers(frame);
     frame->run_shadow = !no_shadow;
     frame->run_blockers = !no_blockers;
@@ -243,7 +251,7 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
         frame->near.n_placed > 0
             ? "lights at finite places, modelled surfaces among them, are tried from each surface"
             : "lamps and emissive meshes are tried from each surface");
-    const char *no_caustics = options->no_shadow ? "not asked for" : why_not_caustics(frame);
+    const char *no_caustics = options->no_shadow ? not_asked_for : why_not_caustics(frame);
     frame->run_caustics = !no_caustics;
     set_line(report, CAUSTICS, no_caustics,
              "virtual mirrors or glass may throw light onto real ones");

@@ -132,7 +132,7 @@ void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
     figures->rays_primary += (uint64_t)n_rays;
     // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
     if (n_rays > 0)
-        gn_rt_intersect16(frame->rt, GN_RT_ALL, &packet, &sight->hits);
+        gn_rt_intersect16(frame->rt, frame->seen, &packet, &sight->hits);
 }
 
 /** Is what a ray sees of the object told by the hit alone? */

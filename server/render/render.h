@@ -38,6 +38,7 @@ enum gn_shading { GN_SHADING_LIGHTS = 0, GN_SHADING_IRRADIANCE = 1 };
 struct gn_render_options {
     enum gn_quality quality;
     enum gn_shading shading;
+    bool no_virtual;         // leave virtual objects out of sight; their shadow and light stay
     bool no_shadow;          // leave the shadow on real surfaces out
     bool shadow_unweighted;  // the paper's sums without the cosine (SEED implies it)
     bool shadow_ignore_real; // real blockers do not count in the sums (SEED implies it)

@@ -324,6 +324,8 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     struct gn_render_options options = m->options->render;
     options.quality = (enum gn_quality)w->job->frame.quality;
     options.seed = w->job->frame.id;
+    options.no_virtual |= w->job->frame.no_virtual;
+    options.no_shadow |= w->job->frame.no_shadow;
     gn_pace_set_options(&w->turn, &options);
     const struct gn_layers *made;
     int rc = make_layers(w, index, &options, b, &made, error);

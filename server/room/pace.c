@@ -67,6 +67,19 @@ static int get_wish(const struct light_count *count, int n)
     return each < count->each ? each : 0;
 }
 
+/** What a frame without its objects or shadows took says nothing of those with them. */
+static void follow_asking(struct gn_pace *pace, const struct gn_msg_frame *frame)
+{
+    if (pace->no_virtual == frame->no_virtual && pace->no_shadow == frame->no_shadow)
+        return;
+    pace->no_virtual = frame->no_virtual;
+    pace->no_shadow = frame->no_shadow;
+    pace->budget = (struct gn_budget){.n_misses = pace->budget.n_misses,
+                                      .n_switches = pace->budget.n_switches};
+    memset(pace->sums, 0, sizeof(pace->sums));
+    pace->n_asked = 0;
+}
+
 /** The part of the pixels to ask. A setting or size that the sums are not of forgets them. */
 static int get_part(struct gn_pace *pace, const struct gn_budget_setting *setting, int width,
                     int height)
@@ -90,6 +103,7 @@ void gn_pace_begin(struct gn_paces *paces, const struct gn_room_options *options
     struct gn_budget_frame known = {.budget_ms = options->budget_ms,
                                     .max_step = GN_BUDGET_MAX_STEP};
     *out = (struct gn_pace_turn){.pace = get_pace(paces, job->answer->session_id)};
+    follow_asking(out->pace, frame);
     if (frame->budget_ms > 0 && (!(known.budget_ms > 0) || frame->budget_ms < known.budget_ms))
         known.budget_ms = (double)frame->budget_ms;
     if (known.budget_ms > 0 && frame->quality == GN_MSG_QUALITY_INTERACTIVE) {

@@ -203,6 +203,9 @@ static const char *find_change(const struct gn_still *still, const struct seen *
         return "the view's first frame";
     if (seen->options.quality != view->options->quality)
         return "another quality than the last frame's";
+    if (seen->options.no_virtual != view->options->no_virtual ||
+        seen->options.no_shadow != view->options->no_shadow)
+        return "other things are asked for than in the last frame";
     if (!is_same_camera(&seen->camera, view->camera))
         return "the camera has moved since the last frame";
     if (!is_same_light(seen->light, view->light))

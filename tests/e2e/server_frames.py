@@ -96,6 +96,41 @@ def why_not_refined(receipt):
     return [line.why for line in getattr(receipt, 'left_out') if getattr(line, 'pass') == 'progressive']
 
 
+def test_what_is_not_asked_for():
+    """Objects and shadows are switched frame by frame, each by itself, and the receipt says so."""
+    def see(viewer, **fields):
+        result, payload = viewer.expect_result(viewer.send_frame(**fields))
+        spared = {getattr(line, 'pass') for line in result.receipt.left_out if line.why == 'not asked for'}
+        middle = 3 * (24 * 64 + 32)
+        # A pixel of the floor beside the cube, another behind it.
+        return spared, payload[middle - 3 * 11:][:3], payload[middle:][:3], payload, result.receipt
+
+    grey = b'\x80\x80\x80'
+    with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 64, 48) as viewer:
+        light_up(light)
+        spared, beside, on, whole, _ = see(viewer, lighting_min_sequence=1, lighting_wait_ms=60000)
+        assert not spared and max(beside) < 128 and on != grey, (spared, beside, on)
+        spared, _, on_alone, alone, receipt = see(viewer, no_shadow=True)
+        assert 'shadow' in spared and 'shade' not in spared and on_alone != grey
+        assert alone[:3 * 64] == grey * 64 and receipt.estimated_error <= 0, receipt
+        left = [why_not_refined(receipt)]
+        spared, beside, on, _, _ = see(viewer, no_virtual=True)
+        assert 'shade' in spared and 'shadow' not in spared, spared
+        assert max(beside) < 128 and max(on) < 80, 'no deep shadow under the hidden cube: %r' % on
+        _, _, _, nothing, receipt = see(viewer, no_virtual=True, no_shadow=True)
+        assert nothing == grey * (64 * 48) and receipt.rays_shadow == 0
+        left.append(why_not_refined(receipt))
+        assert left == 2 * [['other things are asked for than in the last frame']], left
+        # A budget's figures are of frames that show the same.
+        for _ in range(3):
+            receipt = see(viewer, budget_ms=0.001)[4]
+        for verdict in (pb.BUDGET_VERDICT_LEARNS, receipt.budget.verdict):
+            before = receipt.budget.misses
+            receipt = see(viewer, budget_ms=0.001, no_shadow=verdict == pb.BUDGET_VERDICT_LEARNS)[4]
+            assert receipt.budget.verdict == pb.BUDGET_VERDICT_LEARNS, receipt.budget
+            assert receipt.budget.misses == before + 1
+
+
 def test_a_still_view_is_refined():
     """While nothing changes a picture gets better, says how good it is, and in the end costs nothing."""
     with Daemon() as daemon, probe(daemon) as light, Viewer(daemon) as viewer:
@@ -451,7 +486,7 @@ def test_shutdown():
 
 
 run_tests([test_composite_and_receipt, test_lamp_in_the_scene, test_budget,
-           test_a_still_view_is_refined, test_each_id_once,
+           test_what_is_not_asked_for, test_a_still_view_is_refined, test_each_id_once,
            test_one_outstanding_loses_nothing,
            test_slow_reader, test_told_at_once, test_discs_are_told, test_waiting_for_light, test_reasons,
            test_views_and_jpeg, test_environment_formats, test_statistics, test_no_work_without_need,

@@ -269,6 +269,62 @@ static void test_every_reason(void **state)
     gn_test_stage_finish(&stage);
 }
 
+/** Out of sight the objects hide nothing of what is behind them, and throw the shadow they did. */
+static void test_objects_out_of_sight(void **state)
+{
+    (void)state;
+    for (int quality = 0; quality <= GN_QUALITY_REFERENCE; quality++) {
+        struct gn_test_stage stage = {0};
+        init_stage(&stage, quality == GN_QUALITY_REFERENCE ? FLAT_FLOOR | BALL : ALL_THINGS, 0);
+        struct gn_render_options options = {.quality = (enum gn_quality)quality,
+                                            .single_ray = true};
+        size_t n, n_behind = 0;
+        gn_test_stage_render(&stage, &options);
+        float *with = copy_layers(&stage.layers, &n);
+        options.no_virtual = true;
+        check_omissions(&stage, options);
+        const size_t n_pixels = (size_t)stage.layers.width * (size_t)stage.layers.height;
+        for (size_t i = 0; i < n_pixels; i++) {
+            const float *shadow = stage.layers.shadow.data + 3 * i;
+            for (int k = 0; k < 4; k++)
+                assert_true(stage.layers.virtual_rgba.data[4 * i + k] == 0);
+            if (with[4 * i + 3] > 0)
+                n_behind += shadow[0] < 0.9f;
+            else
+                assert_same_bits(with + 4 * n_pixels + 3 * i, shadow, 3);
+        }
+        assert_true(n_behind > 5);
+        assert_int_equal(stage.report.n_virtual_pixels, 0);
+        assert_int_equal(stage.report.rays_shade, 0);
+        assert_left_out(&stage, "shade", "not asked for");
+        assert_true(find_line(&stage, "shadow")->ran);
+        options.no_shadow = true;
+        check_omissions(&stage, options);
+        assert_int_equal(stage.report.n_shadow_pixels, 0);
+        assert_left_out(&stage, "shadow", "not asked for");
+        free(with);
+        gn_test_stage_finish(&stage);
+    }
+    struct gn_test_stage alone = {0};
+    init_stage(&alone, BALL, 0);
+    check_omissions(&alone, (struct gn_render_options){.no_virtual = true});
+    assert_int_equal(alone.report.n_virtual_pixels, 0);
+    gn_test_stage_finish(&alone);
+    struct gn_test_stage mirror = {0};
+    gn_test_stage_add(&mirror, GN_RT_REAL, gn_test_make_plane(6, 3), 0, 0, 0, GN_MATERIAL_MIRROR,
+                      grey);
+    init_stage(&mirror, BALL, 0);
+    gn_test_stage_render(&mirror, NULL);
+    assert_true(find_line(&mirror, "optics")->ran);
+    check_omissions(&mirror, (struct gn_render_options){.no_virtual = true});
+    assert_left_out(&mirror, "optics", "not asked for");
+    for (int i = 0; i < 3 * mirror.layers.width * mirror.layers.height; i++) {
+        assert_true(mirror.layers.added.data[i] == 0);
+        assert_true(mirror.layers.shadow.data[i] == 1);
+    }
+    gn_test_stage_finish(&mirror);
+}
+
 static void test_what_lies_outside_the_picture(void **state)
 {
     (void)state;
@@ -404,6 +460,7 @@ int main(void)
         cmocka_unit_test(test_reference_asks_once_for_many_texels),
         cmocka_unit_test(test_culling_saves_rays),
         cmocka_unit_test(test_every_reason),
+        cmocka_unit_test(test_objects_out_of_sight),
         cmocka_unit_test(test_what_lies_outside_the_picture),
         cmocka_unit_test(test_threads_change_no_bit),
         cmocka_unit_test(test_a_warm_frame_takes_no_memory),
