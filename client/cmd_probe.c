@@ -10,12 +10,12 @@
 
 #include "client/capture/halves.h"
 #include "client/capture/sequence.h"
-#include "client/replay.h"
+#include "client/feed.h"
 #include "proto/attr.h"
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
-    GN_REPLAY_OPTIONS,
+    GN_FEED_OPTIONS,
     GN_LIVE_OPTIONS,
     {.key = "setup",
      .flag = "setup",
@@ -107,7 +107,7 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_setup = gn_options_is_set(options, NULL, NULL, "setup");
     bool has_projection = gn_options_is_set(options, NULL, NULL, "projection");
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
-    const char *misuse = gn_replay_find_misuse(options);
+    const char *misuse = gn_feed_find_misuse(options);
     if (misuse)
         return misuse;
     if (has_dir + has_files + gn_live_count_asked(options) != 1)
@@ -161,7 +161,7 @@ static int check_capture(const struct gn_probe_setup *setup, const struct gn_cap
 
 /** One run of the command. */
 struct probe {
-    struct gn_replay replay;
+    struct gn_feed feed;
     struct gn_probe_setup setup;
     struct gn_msg_environment_frame frame; // what all have in common
     uint64_t first_sequence;
@@ -206,7 +206,7 @@ static int get_pixels(struct probe *p, const struct gn_capture *capture, struct 
 }
 
 /** Opens what --sequence or --files names, with its setup. */
-static int open_source(struct gn_replay *r, const struct gn_options *options,
+static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
     struct probe *p = (struct probe *)r;
@@ -243,19 +243,19 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     if (!err && is_live)
         err = gn_live_open(options, &wanted, &r->source, out_error);
     else if (!err)
-        err = gn_replay_open_files(r, &list, &source_options, out_error);
+        err = gn_feed_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);
     return err;
 }
 
-static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
+static int send_capture(struct gn_feed *r, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
     struct probe *p = (struct probe *)r;
     struct pixels pixels;
     int err = check_capture(&p->setup, capture, out_error);
     if (!err)
-        err = gn_replay_wait(r, capture, out_error);
+        err = gn_feed_wait(r, capture, out_error);
     if (!err)
         err = get_pixels(p, capture, &pixels, out_error);
     if (err)
@@ -263,7 +263,7 @@ static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
     double setup_scale = p->setup.response.scale == 0 ? 1 : p->setup.response.scale;
     p->frame.scale = setup_scale * pixels.scale;
     p->frame.sequence = p->first_sequence + (uint64_t)r->n_sent;
-    p->frame.capture_time_ns = gn_replay_get_capture_ns(r, capture);
+    p->frame.capture_time_ns = gn_feed_get_capture_ns(r, capture);
     p->frame.width = (uint32_t)capture->width;
     p->frame.height = (uint32_t)capture->height;
     p->frame.pixel_format = pixels.format;
@@ -277,19 +277,19 @@ static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
     return 0;
 }
 
-static int report(struct gn_replay *r, int err, const struct gn_error *error)
+static int report(struct gn_feed *r, int err, const struct gn_error *error)
 {
     if (err)
         gn_cmd_fail(&program, error->text);
     printf("%ld environment frames sent", r->n_sent);
-    gn_replay_print_shift(r);
+    gn_feed_print_shift(r);
     printf("\n");
     return err ? 1 : 0;
 }
 
 int gn_cmd_probe(int argc, char *const argv[])
 {
-    static const struct gn_replay_command command = {
+    static const struct gn_feed_command command = {
         .program = &program,
         .role = GN_MSG_ROLE_PROBE,
         .takes_sequences = true,
@@ -299,7 +299,7 @@ int gn_cmd_probe(int argc, char *const argv[])
         .report = report,
     };
     struct probe p = {0};
-    int status = gn_replay_run(&command, &p.replay, argc, argv);
+    int status = gn_feed_run(&command, &p.feed, argc, argv);
     gn_halves_finish(&p.halves);
     return status;
 }

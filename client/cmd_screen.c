@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "client/capture/halves.h"
-#include "client/replay.h"
+#include "client/feed.h"
 #include "proto/attr.h"
 
 static const struct gn_option option_table[] = {
@@ -36,7 +36,7 @@ static const struct gn_option option_table[] = {
      .default_value = "1",
      .value_name = "X",
      .help = "How bright: factor on the linear picture and the scene's emission_scale."},
-    GN_REPLAY_PACE_OPTIONS("Without it they go at 10."),
+    GN_FEED_PACE_OPTIONS("Without it they go at 10."),
 };
 
 static const struct gn_program program = {
@@ -53,7 +53,7 @@ static const struct gn_program program = {
 
 /** One run of the command. */
 struct screen {
-    struct gn_replay replay;
+    struct gn_feed feed;
     struct gn_msg_emitter_frame frame; // what all have in common
     double scale;
     struct gn_halves halves;
@@ -76,7 +76,7 @@ static int check_capture(const struct gn_capture *capture, struct gn_error *out_
     return 0;
 }
 
-static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
+static int send_capture(struct gn_feed *r, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
     struct screen *s = (struct screen *)r;
@@ -84,7 +84,7 @@ static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
     const uint8_t *data = capture->data;
     size_t n_bytes = capture->data_bytes;
     double scale = 1;
-    int err = gn_replay_wait(r, capture, out_error);
+    int err = gn_feed_wait(r, capture, out_error);
     if (!err)
         err = check_capture(capture, out_error);
     if (err)
@@ -114,14 +114,14 @@ static int send_capture(struct gn_replay *r, const struct gn_capture *capture,
     return 0;
 }
 
-static int report(struct gn_replay *r, int err, const struct gn_error *error)
+static int report(struct gn_feed *r, int err, const struct gn_error *error)
 {
     if (err)
         gn_cmd_fail(&program, error->text);
     if (err && err != -EINTR)
         return 1; // the server need not have taken what was sent
     printf("%ld pictures sent", r->n_sent);
-    gn_replay_print_shift(r);
+    gn_feed_print_shift(r);
     printf("\n");
     return err ? 1 : 0;
 }
@@ -134,7 +134,7 @@ static const char *find_misuse(const struct gn_options *options)
     return NULL;
 }
 
-static int open_source(struct gn_replay *r, const struct gn_options *options,
+static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
     struct screen *s = (struct screen *)r;
@@ -146,14 +146,14 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     int err = gn_file_list_find(gn_options_get_string(options, NULL, NULL, "files"), r->rate_hz,
                                 &list, out_error);
     if (!err)
-        err = gn_replay_open_files(r, &list, &source_options, out_error);
+        err = gn_feed_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);
     return err;
 }
 
 int gn_cmd_screen(int argc, char *const argv[])
 {
-    static const struct gn_replay_command command = {
+    static const struct gn_feed_command command = {
         .program = &program,
         .role = GN_MSG_ROLE_SCREEN,
         .find_misuse = find_misuse,
@@ -162,7 +162,7 @@ int gn_cmd_screen(int argc, char *const argv[])
         .report = report,
     };
     struct screen s = {0};
-    int status = gn_replay_run(&command, &s.replay, argc, argv);
+    int status = gn_feed_run(&command, &s.feed, argc, argv);
     gn_halves_finish(&s.halves);
     return status;
 }

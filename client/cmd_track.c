@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "client/cmd.h"
-#include "client/replay.h"
+#include "client/feed.h"
 #include "common/file.h"
 #include "proto/attr.h"
 
@@ -77,7 +77,7 @@ struct timed_pose {
 
 /** One run of the command. */
 struct track {
-    struct gn_replay replay;
+    struct gn_feed feed;
     struct gn_msg_pose message;
     struct timed_pose *poses; // [n], owned; NULL: an orbit
     long n;
@@ -136,10 +136,10 @@ static int read_poses(struct track *t, const char *path, struct gn_error *out_er
 /** The pose that is next, its time after the first. */
 static struct timed_pose get_pose(const struct track *t)
 {
-    long i = t->replay.n_sent;
+    long i = t->feed.n_sent;
     if (t->poses)
         return (struct timed_pose){t->poses[i].time_s - t->poses[0].time_s, t->poses[i].pose};
-    double time_s = (double)i / t->replay.rate_hz;
+    double time_s = (double)i / t->feed.rate_hz;
     double angle = 2 * 3.14159265358979323846 * time_s / ORBIT_PERIOD_S;
     return (struct timed_pose){time_s,
                                {{cos(angle / 2), 0, 0, sin(angle / 2)},
@@ -148,11 +148,11 @@ static struct timed_pose get_pose(const struct track *t)
 
 static int send_all(struct track *t, struct gn_error *out_error)
 {
-    struct gn_replay *r = &t->replay;
+    struct gn_feed *r = &t->feed;
     while (!(t->poses && r->n_sent == t->n) && !(r->n_wanted > 0 && r->n_sent == r->n_wanted)) {
         struct timed_pose pose = get_pose(t);
         const struct gn_capture due = {.time_s = pose.time_s};
-        int err = gn_replay_wait(r, &due, out_error);
+        int err = gn_feed_wait(r, &due, out_error);
         if (err)
             return err;
         gn_cmd_make_transform(&pose.pose, &t->message.world_from_object);
@@ -163,7 +163,7 @@ static int send_all(struct track *t, struct gn_error *out_error)
             return gn_cmd_set_fault(r->client, err, out_error);
         r->n_sent++;
     }
-    return gn_replay_wait_last(r, out_error); // what is wrong with the last ones is said only now
+    return gn_feed_wait_last(r, out_error); // what is wrong with the last ones is said only now
 }
 
 /** What is wrong with the options together; NULL: nothing. */
@@ -183,11 +183,11 @@ static int prepare(struct track *t, const struct gn_options *options, struct gn_
     const char *path = gn_options_get_string(options, NULL, NULL, "poses");
     gn_wire_set_string(t->message.object, sizeof(t->message.object),
                        gn_options_get_string(options, NULL, NULL, "object"));
-    t->replay.program = &program;
-    t->replay.rate_hz = path ? 0 : 60;
+    t->feed.program = &program;
+    t->feed.rate_hz = path ? 0 : 60;
     if (gn_options_is_set(options, NULL, NULL, "rate"))
-        t->replay.rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
-    t->replay.n_wanted = (long)gn_options_get_int(options, NULL, NULL, "count");
+        t->feed.rate_hz = gn_options_get_double(options, NULL, NULL, "rate");
+    t->feed.n_wanted = (long)gn_options_get_int(options, NULL, NULL, "count");
     if (path)
         return read_poses(t, path, out_error);
     t->orbit_m = gn_options_get_double(options, NULL, NULL, "orbit");
@@ -198,7 +198,7 @@ static int prepare(struct track *t, const struct gn_options *options, struct gn_
 static int run(struct track *t, const struct gn_options *options)
 {
     struct gn_error error = {0};
-    struct gn_replay *r = &t->replay;
+    struct gn_feed *r = &t->feed;
     gn_cmd_catch_signals();
     int rc = prepare(t, options, &error);
     if (rc == 0)
@@ -212,7 +212,7 @@ static int run(struct track *t, const struct gn_options *options)
         gn_cmd_fail(&program, rc == -EINTR ? "interrupted" : error.text);
     if (r->client && (is_done || rc == -EINTR)) {
         printf("%ld poses sent", r->n_sent);
-        gn_replay_print_shift(r);
+        gn_feed_print_shift(r);
         printf("\n");
     }
     gn_cmd_disconnect(&r->client);

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "client/capture/sequence.h"
-#include "client/replay.h"
+#include "client/feed.h"
 #include "client/view/record.h"
 #include "common/clock.h"
 #include "common/text.h"
@@ -26,7 +26,7 @@
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
-    GN_REPLAY_OPTIONS,
+    GN_FEED_OPTIONS,
     GN_LIVE_OPTIONS,
     {.key = "camera",
      .flag = "camera",
@@ -120,7 +120,7 @@ struct pending {
 
 /** One run of the command. */
 struct view {
-    struct gn_replay replay;
+    struct gn_feed feed;
     const char *dir; // borrowed from the options
     struct gn_record *record;
     struct gn_camera camera;
@@ -141,7 +141,7 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
     bool has_camera = gn_options_is_set(options, NULL, NULL, "camera");
-    const char *misuse = gn_replay_find_misuse(options);
+    const char *misuse = gn_feed_find_misuse(options);
     if (misuse)
         return misuse;
     if (has_dir + has_files + gn_live_count_asked(options) != 1 || has_dir == has_camera)
@@ -175,7 +175,7 @@ static int send_camera(struct view *v)
     memcpy(message.noise_offset, c->match.noise_offset, sizeof(message.noise_offset));
     gn_cmd_make_response(&c->response, &message.response);
     memcpy(message.matrix_to_rec709, c->response.to_rec709, sizeof(c->response.to_rec709));
-    return gn_client_send_camera(v->replay.client, &message);
+    return gn_client_send_camera(v->feed.client, &message);
 }
 
 static struct pending *find_pending(struct view *v, uint64_t id)
@@ -247,16 +247,16 @@ static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *
     for (;;) {
         if (gn_cmd_is_interrupted())
             return -EINTR;
-        int timeout_ms = gn_replay_get_timeout_ms(due_ns);
+        int timeout_ms = gn_feed_get_timeout_ms(due_ns);
         bool is_due = timeout_ms == 0;
         if (is_due && v->n_outstanding > max_left)
             timeout_ms = 200;
         struct gn_client_event event;
-        int err, got = gn_client_poll(v->replay.client, timeout_ms, &event);
+        int err, got = gn_client_poll(v->feed.client, timeout_ms, &event);
         if (got < 0)
-            err = gn_cmd_set_fault(v->replay.client, got, out_error);
+            err = gn_cmd_set_fault(v->feed.client, got, out_error);
         else if (got == 0)
-            err = gn_replay_keep_clock(&v->replay, out_error);
+            err = gn_feed_keep_clock(&v->feed, out_error);
         else if (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED)
             err = take_answer(v, &event, out_error);
         else
@@ -272,22 +272,22 @@ static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *
 static void set_light_wanted(struct view *v, struct gn_msg_frame *frame)
 {
     int64_t now_ns = gn_client_now_ns();
-    if (v->replay.n_sent == 0)
+    if (v->feed.n_sent == 0)
         v->first_sent_ns = now_ns;
     int64_t left_ms = LIGHT_WAIT_MS - (now_ns - v->first_sent_ns) / GN_NS_PER_MS;
     if (v->sync_light) {
-        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->replay.n_sent;
+        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->feed.n_sent;
         frame->lighting_wait_ms = LIGHT_WAIT_MS;
     } else if (v->n_results == 0 && left_ms > 0) {
         frame->lighting_wait_ms = (uint32_t)left_ms;
     }
 }
 
-static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
+static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
                       struct gn_error *out_error)
 {
     struct view *v = (struct view *)r;
-    int err = serve(v, gn_replay_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
+    int err = serve(v, gn_feed_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
     if (err)
         return err;
     bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
@@ -302,7 +302,7 @@ static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
     struct pending *p = find_pending(v, 0);
     struct gn_msg_frame frame = v->frame;
     frame.id = (uint64_t)r->n_sent + 1;
-    frame.capture_time_ns = gn_replay_get_capture_ns(r, capture);
+    frame.capture_time_ns = gn_feed_get_capture_ns(r, capture);
     frame.views_count = 1;
     frame.views[0] = (struct gn_msg_frame_view){
         .has_world_from_camera = true,
@@ -324,13 +324,13 @@ static int send_frame(struct gn_replay *r, const struct gn_capture *capture,
 }
 
 /** So that the picture that is read then is the newest when it is sent. */
-static int wait_for_room(struct gn_replay *r, struct gn_error *out_error)
+static int wait_for_room(struct gn_feed *r, struct gn_error *out_error)
 {
     struct view *v = (struct view *)r;
     return serve(v, 0, v->max_outstanding - 1, out_error);
 }
 
-static int wait_for_answers(struct gn_replay *r, struct gn_error *out_error)
+static int wait_for_answers(struct gn_feed *r, struct gn_error *out_error)
 {
     return serve((struct view *)r, 0, 0, out_error);
 }
@@ -350,7 +350,7 @@ static void set_frame_options(struct view *v, const struct gn_options *options)
         v->sync_light = (uint64_t)gn_options_get_int(options, NULL, NULL, "sync-light");
 }
 
-static int open_source(struct gn_replay *r, const struct gn_options *options,
+static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
     struct view *v = (struct view *)r;
@@ -383,12 +383,12 @@ static int open_source(struct gn_replay *r, const struct gn_options *options,
     if (!err)
         err = gn_file_list_check_names(&list, out_error);
     if (!err)
-        err = gn_replay_open_files(r, &list, &source_options, out_error);
+        err = gn_feed_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);
     return err;
 }
 
-static int begin(struct gn_replay *r, struct gn_error *out_error)
+static int begin(struct gn_feed *r, struct gn_error *out_error)
 {
     struct view *v = (struct view *)r;
     int err = send_camera(v);
@@ -396,7 +396,7 @@ static int begin(struct gn_replay *r, struct gn_error *out_error)
                : gn_record_open(v->dir, &v->record, out_error);
 }
 
-static int report(struct gn_replay *r, int err, const struct gn_error *error)
+static int report(struct gn_feed *r, int err, const struct gn_error *error)
 {
     struct view *v = (struct view *)r;
     struct gn_error drop_error = {0}, record_error = {0};
@@ -414,14 +414,14 @@ static int report(struct gn_replay *r, int err, const struct gn_error *error)
     if (v->n_results)
         printf("; %.1f ms from sending to result (mean), %.1f at most",
                v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
-    gn_replay_print_shift(r);
+    gn_feed_print_shift(r);
     printf("; in %s\n", v->dir);
     return err || record_err ? 1 : 0;
 }
 
 int gn_cmd_view(int argc, char *const argv[])
 {
-    static const struct gn_replay_command command = {
+    static const struct gn_feed_command command = {
         .program = &program,
         .role = GN_MSG_ROLE_VIEWER,
         .takes_sequences = true,
@@ -434,5 +434,5 @@ int gn_cmd_view(int argc, char *const argv[])
         .report = report,
     };
     struct view v = {0};
-    return gn_replay_run(&command, &v.replay, argc, argv);
+    return gn_feed_run(&command, &v.feed, argc, argv);
 }

@@ -10,14 +10,14 @@ import sys
 
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 CONNECT = {'server', 'room', 'token'}
-REPLAY = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
+FEED = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
 LIVE = {'gige', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
-    ([GNOMON, 'probe'], CONNECT | REPLAY | LIVE | {'setup', 'projection', 'first-sequence'}),
+    ([GNOMON, 'probe'], CONNECT | FEED | LIVE | {'setup', 'projection', 'first-sequence'}),
     ([GNOMON, 'track'], CONNECT | {'object', 'poses', 'orbit', 'rate', 'count'}),
-    ([GNOMON, 'screen'], CONNECT | (REPLAY - {'sequence'}) | {'stream', 'scale'}),
-    ([GNOMON, 'view'], CONNECT | REPLAY | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
+    ([GNOMON, 'screen'], CONNECT | (FEED - {'sequence'}) | {'stream', 'scale'}),
+    ([GNOMON, 'view'], CONNECT | FEED | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
                                                   'quality', 'budget-ms', 'outstanding',
                                                   'match', 'sync-light'}),
     ([GNOMON, 'doctor'], CONNECT),

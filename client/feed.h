@@ -5,8 +5,8 @@
  * the way from the command line to the exit status. Pictures of a live source are not paced: each
  * is sent when it comes, and the newest wins.
  */
-#ifndef GN_CLIENT_REPLAY_H
-#define GN_CLIENT_REPLAY_H
+#ifndef GN_CLIENT_FEED_H
+#define GN_CLIENT_FEED_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -15,8 +15,8 @@
 #include "client/cmd.h"
 #include "client/live.h"
 
-/** Rows of the option table that every command which replays recordings has. */
-#define GN_REPLAY_OPTIONS                                                                          \
+/** Rows of the option table that every command that streams recorded pictures has. */
+#define GN_FEED_OPTIONS                                                                            \
     {.key = "sequence",                                                                            \
      .flag = "sequence",                                                                           \
      .type = GN_OPTION_STRING,                                                                     \
@@ -28,11 +28,11 @@
          .value_name = "PATTERN",                                                                  \
          .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
                  "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
-        GN_REPLAY_PACE_OPTIONS("Without it a sequence keeps its own times; files go at 10.")
+        GN_FEED_PACE_OPTIONS("Without it a sequence keeps its own times; files go at 10.")
 
-/** Rows of the option table that every command which replays pictures has; default_rate: a sentence
+/** Rows of the option table that every command that streams pictures has; default_rate: a sentence
  * that says at which rate where --rate is not given. */
-#define GN_REPLAY_PACE_OPTIONS(default_rate)                                                       \
+#define GN_FEED_PACE_OPTIONS(default_rate)                                                         \
     {.key = "rate",                                                                                \
      .flag = "rate",                                                                               \
      .type = GN_OPTION_DOUBLE,                                                                     \
@@ -61,7 +61,7 @@
     }
 
 /** One run of a command; each command's own state begins with it. */
-struct gn_replay {
+struct gn_feed {
     const struct gn_program *program;
     struct gn_client *client; // owned; NULL until connected
     struct gn_source *source; // owned
@@ -77,72 +77,72 @@ struct gn_replay {
 };
 
 /** A command. Where a function returns a negative errno it has set a sentence. */
-struct gn_replay_command {
+struct gn_feed_command {
     const struct gn_program *program;
     enum gn_msg_role role;
-    bool takes_sequences; // has GN_REPLAY_OPTIONS
+    bool takes_sequences; // has GN_FEED_OPTIONS
     /** What is wrong with the options together; NULL: nothing. */
     const char *(*find_misuse)(const struct gn_options *options);
     /** Opens the source and reads its options, borrowed for the whole run. */
-    int (*open)(struct gn_replay *r, const struct gn_options *options, struct gn_error *out_error);
+    int (*open)(struct gn_feed *r, const struct gn_options *options, struct gn_error *out_error);
     /** The first messages, once connected; NULL: none. */
-    int (*begin)(struct gn_replay *r, struct gn_error *out_error);
+    int (*begin)(struct gn_feed *r, struct gn_error *out_error);
     /**
      * Before a live source is read: takes what the server has said, and waits until another picture
      * may be sent. -EINTR: Ctrl-C. NULL: all pictures may be sent at once, and nothing but trouble
      * is expected.
      */
-    int (*serve)(struct gn_replay *r, struct gn_error *out_error);
+    int (*serve)(struct gn_feed *r, struct gn_error *out_error);
     /** Waits until the picture is due, sends it and counts it. */
-    int (*send)(struct gn_replay *r, const struct gn_capture *capture, struct gn_error *out_error);
+    int (*send)(struct gn_feed *r, const struct gn_capture *capture, struct gn_error *out_error);
     /** Waits for the server's last words; NULL: for 200 ms. */
-    int (*end)(struct gn_replay *r, struct gn_error *out_error);
+    int (*end)(struct gn_feed *r, struct gn_error *out_error);
     /** Says what was done; err, error: how it ended. Returns the exit status. */
-    int (*report)(struct gn_replay *r, int err, const struct gn_error *error);
+    int (*report)(struct gn_feed *r, int err, const struct gn_error *error);
 };
 
 /** Runs a command with its zeroed state. Returns the exit status. */
-int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,
-                  char *const argv[]);
+int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int argc,
+                char *const argv[]);
 
-/** What is wrong with the options of GN_REPLAY_OPTIONS and GN_LIVE_OPTIONS together; NULL: nothing
+/** What is wrong with the options of GN_FEED_OPTIONS and GN_LIVE_OPTIONS together; NULL: nothing
  * but that there may be no source, or several. */
-const char *gn_replay_find_misuse(const struct gn_options *options);
+const char *gn_feed_find_misuse(const struct gn_options *options);
 
-/** Opens the files as the replay's source. Returns 0, or -ENOMEM and a sentence. */
-GN_MUST_USE int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
-                                     const struct gn_file_source_options *options,
-                                     struct gn_error *out_error);
+/** Opens the files as the source. Returns 0, or -ENOMEM and a sentence. */
+GN_MUST_USE int gn_feed_open_files(struct gn_feed *r, struct gn_file_list *list,
+                                   const struct gn_file_source_options *options,
+                                   struct gn_error *out_error);
 
 /** When the picture was taken, in the server's clock: a recording's is taken when it is sent. */
-int64_t gn_replay_get_capture_ns(const struct gn_replay *r, const struct gn_capture *capture);
+int64_t gn_feed_get_capture_ns(const struct gn_feed *r, const struct gn_capture *capture);
 
 /**
  * When the next picture is due, own monotonic clock; a live source's is due at once. Without
  * --start-at the first is due now. A first picture that is late at all, and a later one that is
  * more than 2 s late, is due now and shifts all that follow, so that nothing bursts.
  */
-int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture);
+int64_t gn_feed_get_due_ns(struct gn_feed *r, const struct gn_capture *capture);
 
 /** Milliseconds to wait in one gn_client_poll: until due_ns, but Ctrl-C must be seen meanwhile. */
-int gn_replay_get_timeout_ms(int64_t due_ns);
+int gn_feed_get_timeout_ms(int64_t due_ns);
 
 /** Measures the clock again where that was a minute ago. Returns 0, or a negative errno and a
  * sentence: the connection is lost. */
-GN_MUST_USE int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_error);
+GN_MUST_USE int gn_feed_keep_clock(struct gn_feed *r, struct gn_error *out_error);
 
 /**
  * Serves a connection on which nothing but trouble is expected, and its clock, until the picture is
  * due. Returns 0, -EINTR (Ctrl-C), or a negative errno and a sentence.
  */
-GN_MUST_USE int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
-                               struct gn_error *out_error);
+GN_MUST_USE int gn_feed_wait(struct gn_feed *r, const struct gn_capture *capture,
+                             struct gn_error *out_error);
 
 /** Serves it for 200 ms more: an ERROR about the last picture is on its way, if there is one. Same
  * returns. */
-GN_MUST_USE int gn_replay_wait_last(struct gn_replay *r, struct gn_error *out_error);
+GN_MUST_USE int gn_feed_wait_last(struct gn_feed *r, struct gn_error *out_error);
 
 /** ", N s behind schedule" to stdout where it was shifted. */
-void gn_replay_print_shift(const struct gn_replay *r);
+void gn_feed_print_shift(const struct gn_feed *r);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#include "client/replay.h"
+#include "client/feed.h"
 
 #include <errno.h>
 #include <math.h>
@@ -9,14 +9,14 @@
 
 #include "common/clock.h"
 
-/** Lateness that a replay catches up. */
+/** Lateness that is caught up. */
 #define MAX_LATE_NS (2 * GN_NS_PER_S)
 /** How long the server's word on the last picture is waited for. */
 #define LAST_WORDS_NS (200 * GN_NS_PER_MS)
 /** Pictures per second where neither the files nor --rate say. */
 #define DEFAULT_RATE_HZ 10.0
 
-const char *gn_replay_find_misuse(const struct gn_options *options)
+const char *gn_feed_find_misuse(const struct gn_options *options)
 {
     if (gn_live_count_asked(options) > 0 && (gn_options_is_set(options, NULL, NULL, "rate") ||
                                              gn_options_is_set(options, NULL, NULL, "start-at") ||
@@ -25,15 +25,15 @@ const char *gn_replay_find_misuse(const struct gn_options *options)
     return gn_live_find_misuse(options);
 }
 
-int gn_replay_open_files(struct gn_replay *r, struct gn_file_list *list,
-                         const struct gn_file_source_options *options, struct gn_error *out_error)
+int gn_feed_open_files(struct gn_feed *r, struct gn_file_list *list,
+                       const struct gn_file_source_options *options, struct gn_error *out_error)
 {
     return gn_file_source_open(list, options, &r->source) < 0
                ? gn_error_set(out_error, -ENOMEM, "out of memory")
                : 0;
 }
 
-static void read_pace(struct gn_replay *r, const struct gn_options *options, bool has_times)
+static void read_pace(struct gn_feed *r, const struct gn_options *options, bool has_times)
 {
     r->has_start = gn_options_is_set(options, NULL, NULL, "start-at");
     if (r->has_start) {
@@ -48,13 +48,13 @@ static void read_pace(struct gn_replay *r, const struct gn_options *options, boo
     r->n_wanted = gn_options_get_int(options, NULL, NULL, "count");
 }
 
-int64_t gn_replay_get_capture_ns(const struct gn_replay *r, const struct gn_capture *capture)
+int64_t gn_feed_get_capture_ns(const struct gn_feed *r, const struct gn_capture *capture)
 {
     return gn_client_to_server_ns(r->client,
                                   capture->time_ns ? capture->time_ns : gn_client_now_ns());
 }
 
-int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *capture)
+int64_t gn_feed_get_due_ns(struct gn_feed *r, const struct gn_capture *capture)
 {
     if (r->source && r->source->is_live)
         return gn_clock_get_monotonic_ns();
@@ -79,13 +79,13 @@ int64_t gn_replay_get_due_ns(struct gn_replay *r, const struct gn_capture *captu
     return r->start_ns + since_start_ns;
 }
 
-void gn_replay_print_shift(const struct gn_replay *r)
+void gn_feed_print_shift(const struct gn_feed *r)
 {
     if (r->shifted_ns > 0)
         printf(", %.1f s behind schedule", (double)r->shifted_ns * 1e-9);
 }
 
-int gn_replay_get_timeout_ms(int64_t due_ns)
+int gn_feed_get_timeout_ms(int64_t due_ns)
 {
     int64_t left_ns = due_ns - gn_clock_get_monotonic_ns();
     if (left_ns <= 0)
@@ -93,7 +93,7 @@ int gn_replay_get_timeout_ms(int64_t due_ns)
     return left_ns > 200 * GN_NS_PER_MS ? 200 : (int)(left_ns / GN_NS_PER_MS) + 1;
 }
 
-int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_error)
+int gn_feed_keep_clock(struct gn_feed *r, struct gn_error *out_error)
 {
     int64_t now_ns = gn_clock_get_monotonic_ns();
     if (now_ns - r->clock_ns < 60 * GN_NS_PER_S)
@@ -104,35 +104,34 @@ int gn_replay_keep_clock(struct gn_replay *r, struct gn_error *out_error)
     return err && err != -ETIMEDOUT ? gn_cmd_set_fault(r->client, err, out_error) : 0;
 }
 
-static int serve_until(struct gn_replay *r, int64_t due_ns, struct gn_error *out_error)
+static int serve_until(struct gn_feed *r, int64_t due_ns, struct gn_error *out_error)
 {
     for (;;) {
         if (gn_cmd_is_interrupted())
             return -EINTR;
-        int timeout_ms = gn_replay_get_timeout_ms(due_ns);
+        int timeout_ms = gn_feed_get_timeout_ms(due_ns);
         struct gn_client_event event;
         int got = gn_client_poll(r->client, timeout_ms, &event);
         int err = got < 0   ? gn_cmd_set_fault(r->client, got, out_error)
                   : got > 0 ? gn_cmd_take_event(&event, out_error)
-                            : gn_replay_keep_clock(r, out_error);
+                            : gn_feed_keep_clock(r, out_error);
         if (err || (got == 0 && timeout_ms == 0))
             return err;
     }
 }
 
-int gn_replay_wait(struct gn_replay *r, const struct gn_capture *capture,
-                   struct gn_error *out_error)
+int gn_feed_wait(struct gn_feed *r, const struct gn_capture *capture, struct gn_error *out_error)
 {
-    return serve_until(r, gn_replay_get_due_ns(r, capture), out_error);
+    return serve_until(r, gn_feed_get_due_ns(r, capture), out_error);
 }
 
-int gn_replay_wait_last(struct gn_replay *r, struct gn_error *out_error)
+int gn_feed_wait_last(struct gn_feed *r, struct gn_error *out_error)
 {
     return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
 }
 
 /** Until the camera or the server has something, for GN_SOURCE_WAIT_MS at most. */
-static void wait_for_either(const struct gn_replay *r)
+static void wait_for_either(const struct gn_feed *r)
 {
     if (r->source->fd < 0)
         return; // reading waits
@@ -142,7 +141,7 @@ static void wait_for_either(const struct gn_replay *r)
 }
 
 /** Serves the connection and reads the camera until it has a picture. As gn_source_read. */
-static int read_live(const struct gn_replay_command *command, struct gn_replay *r,
+static int read_live(const struct gn_feed_command *command, struct gn_feed *r,
                      struct gn_capture *out, struct gn_error *out_error)
 {
     for (;;) {
@@ -159,7 +158,7 @@ static int read_live(const struct gn_replay_command *command, struct gn_replay *
     }
 }
 
-static int stream(const struct gn_replay_command *command, struct gn_replay *r,
+static int stream(const struct gn_feed_command *command, struct gn_feed *r,
                   struct gn_error *out_error)
 {
     while (!r->n_wanted || r->n_sent < r->n_wanted) {
@@ -174,11 +173,11 @@ static int stream(const struct gn_replay_command *command, struct gn_replay *r,
         if (err)
             return err;
     }
-    return command->end ? command->end(r, out_error) : gn_replay_wait_last(r, out_error);
+    return command->end ? command->end(r, out_error) : gn_feed_wait_last(r, out_error);
 }
 
 /** Runs with everything open; the exit status. */
-static int run(const struct gn_replay_command *command, struct gn_replay *r)
+static int run(const struct gn_feed_command *command, struct gn_feed *r)
 {
     struct gn_error error = {0};
     int err = stream(command, r, &error);
@@ -192,8 +191,8 @@ static int run(const struct gn_replay_command *command, struct gn_replay *r)
     return status;
 }
 
-int gn_replay_run(const struct gn_replay_command *command, struct gn_replay *r, int argc,
-                  char *const argv[])
+int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int argc,
+                char *const argv[])
 {
     struct gn_options *options = NULL;
     int go = gn_cmd_load(command->program, argc, argv, &options);
