@@ -70,12 +70,19 @@ struct sample {
     uint32_t shown; // 1 + the virtual object that a real mirror or glass shows here; 0: none
 };
 
-/** What the rays of 16 pixels meet. */
-struct sight {
+/** The rays of 16 pixels. */
+struct sight_rays {
     float dir[3][LANES]; // unit, world
     float dir_z[LANES];  // their components along the camera's z
     bool has_ray[LANES]; // false: outside the picture, or the camera has no ray there
+};
+
+/** What the centres of a block's pixels see. */
+struct sight {
     struct gn_rt_packet_hits hits;
+    float depth[LANES]; // m, along the camera's z; infinite where nothing is met
+    bool is_bounded;    // the box is known
+    struct box box;     // about the origins of rays from all that is seen, widened
 };
 
 /** How a quality chooses the pixels that get a grid of rays. */
@@ -220,6 +227,9 @@ struct frame {
 
     uint64_t n_photons, rays_caustics; // after the pass: photons that the camera sees
 
+    struct sight *kept; // [n_tiles * BLOCKS * BLOCKS] of the tiles' blocks; NULL: not kept (kept.h)
+    bool is_seen;       // it is known from a frame before
+
     const struct pass *pass; // NULL: a frame by itself; else its samples go into the pass' sums
     struct gn_layers *layers;
     struct feature *features;     // [h][w], but of plain blocks
@@ -256,21 +266,21 @@ void gn_plan_finish(const struct frame *frame, const struct tile_figures *sum,
 
 /* primary.c */
 
+/** Do two cameras of one pose see along the same rays? */
+bool gn_primary_has_same_rays(const struct gn_camera *a, const struct gn_camera *b);
 /** Fills table[h][w][3] and slopes[4] (may be NULL); see struct frame. pass: NULL, or whose points
  * of the pixels. */
 void gn_primary_make_rays(const struct gn_camera *camera, const struct pass *pass,
                           struct gn_pool *pool, float *table, double *out_slopes);
 /** Aims rays through the centres of a block's pixels, the first of which is (x, y). */
-void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight *out);
-/** Fills the hits. */
-void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
-                            struct tile_figures *figures);
-/** A box about the origins of rays from all that the lanes see, widened. False: something is seen
- * that takes more to tell. */
-bool gn_primary_bound(const struct frame *frame, const struct sight *sight, struct box *out_box);
+void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight_rays *out);
+/** What a block sees along its rays. */
+void gn_primary_see_block(const struct frame *frame, const struct sight_rays *rays,
+                          struct sight *out, struct tile_figures *figures);
 /** What a lane sees, as a sample; all but its group and its seed. */
-void gn_primary_take(const struct frame *frame, const struct sight *sight, int lane,
-                     struct sample *out_sample, struct tile_figures *figures);
+void gn_primary_take(const struct frame *frame, const struct sight_rays *rays,
+                     const struct gn_rt_packet_hits *hits, int lane, struct sample *out_sample,
+                     struct tile_figures *figures);
 /** The unit world direction of a camera direction. */
 void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
                     struct sample *sample);

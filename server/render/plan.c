@@ -217,7 +217,9 @@ void gn_plan_make(struct frame *frame, const double slopes[static 4],
     frame->run_bounces = options->bounces > 0;
     frame->seen = options->no_virtual ? GN_RT_REAL : GN_RT_ALL;
     report->n_plan = N_LINES;
-    set_line(report, PRIMARY, NULL, "one ray through each pixel's centre");
+    set_line(report, PRIMARY,
+             frame->is_seen ? "camera and scene rest: what the pixels' centres see is kept" : NULL,
+             "one ray through each pixel's centre");
     set_line(report, REFINE,
              frame->rule.grid > 1  ? NULL
              : options->single_ray ? "one ray for each pixel was asked for"

@@ -7,6 +7,13 @@
 
 #include "server/render/pass.h"
 
+bool gn_primary_has_same_rays(const struct gn_camera *a, const struct gn_camera *b)
+{
+    return a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
+           a->cx == b->cx && a->cy == b->cy &&
+           memcmp(a->distortion, b->distortion, sizeof(a->distortion)) == 0;
+}
+
 struct rays_job {
     const struct gn_camera *camera;
     const struct pass *pass; // NULL: rays through the centres
@@ -92,7 +99,7 @@ void gn_primary_aim(const struct frame *frame, const float dir_camera[static 3],
     sample->dir_z = dir_camera[2];
 }
 
-void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight *out)
+void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight_rays *out)
 {
     size_t width = (size_t)frame->camera->width;
     float dir[3][LANES];
@@ -111,8 +118,8 @@ void gn_primary_aim_block(const struct frame *frame, int x, int y, struct sight 
     memcpy(out->dir_z, dir[2], sizeof(out->dir_z));
 }
 
-void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
-                            struct tile_figures *figures)
+static void trace_block(const struct frame *frame, const struct sight_rays *rays,
+                        struct gn_rt_packet_hits *hits, struct tile_figures *figures)
 {
     struct gn_rt_packet packet;
     int n_rays = 0;
@@ -122,17 +129,17 @@ void gn_primary_trace_block(const struct frame *frame, struct sight *sight,
         packet.org_z[i] = frame->origin[2];
         packet.t_near[i] = 0;
         packet.t_far[i] = INFINITY;
-        packet.valid[i] = sight->has_ray[i] ? -1 : 0;
-        n_rays += sight->has_ray[i];
+        packet.valid[i] = rays->has_ray[i] ? -1 : 0;
+        n_rays += rays->has_ray[i];
     }
-    memcpy(packet.dir_x, sight->dir[0], sizeof(packet.dir_x));
-    memcpy(packet.dir_y, sight->dir[1], sizeof(packet.dir_y));
-    memcpy(packet.dir_z, sight->dir[2], sizeof(packet.dir_z));
-    sight->hits.met = 0;
+    memcpy(packet.dir_x, rays->dir[0], sizeof(packet.dir_x));
+    memcpy(packet.dir_y, rays->dir[1], sizeof(packet.dir_y));
+    memcpy(packet.dir_z, rays->dir[2], sizeof(packet.dir_z));
+    hits->met = 0;
     figures->rays_primary += (uint64_t)n_rays;
     // One ray against both sets: what is nearest is seen, so real objects hide virtual ones.
     if (n_rays > 0)
-        gn_rt_intersect16(frame->rt, frame->seen, &packet, &sight->hits);
+        gn_rt_intersect16(frame->rt, frame->seen, &packet, hits);
 }
 
 /** Is what a ray sees of the object told by the hit alone? */
@@ -147,14 +154,15 @@ static bool is_simple(const struct frame *frame, const struct gn_scene_object *o
 
 /* Rays leave a resting surface that is not lifted by its clearance off the point, at most
  * FLT_EPSILON (4 + 16 x 2) times the largest coordinate: less than half of the frame's margin. */
-bool gn_primary_bound(const struct frame *frame, const struct sight *sight, struct box *out_box)
+static bool bound_block(const struct frame *frame, const struct gn_rt_packet_hits *hits,
+                        struct box *out_box)
 {
-    for (uint32_t met = sight->hits.met; met != 0; met &= met - 1) {
-        uint32_t index = sight->hits.object[__builtin_ctz(met)];
+    for (uint32_t met = hits->met; met != 0; met &= met - 1) {
+        uint32_t index = hits->object[__builtin_ctz(met)];
         if (!is_simple(frame, &frame->scene->objects[index]))
             return false;
     }
-    gn_rt_bound_points(frame->rt, &sight->hits, out_box->min, out_box->max);
+    gn_rt_bound_points(frame->rt, hits, out_box->min, out_box->max);
     for (int k = 0; k < 3; k++) {
         out_box->min[k] -= frame->margin;
         out_box->max[k] += frame->margin;
@@ -162,21 +170,33 @@ bool gn_primary_bound(const struct frame *frame, const struct sight *sight, stru
     return true;
 }
 
-void gn_primary_take(const struct frame *frame, const struct sight *sight, int lane,
-                     struct sample *s, struct tile_figures *figures)
+void gn_primary_see_block(const struct frame *frame, const struct sight_rays *rays,
+                          struct sight *out, struct tile_figures *figures)
+{
+    trace_block(frame, rays, &out->hits, figures);
+    for (int i = 0; i < LANES; i++) {
+        bool is_met = out->hits.met >> i & 1;
+        out->depth[i] = is_met ? out->hits.distance[i] * rays->dir_z[i] : INFINITY;
+    }
+    out->is_bounded = (frame->skips || frame->kept) && bound_block(frame, &out->hits, &out->box);
+}
+
+void gn_primary_take(const struct frame *frame, const struct sight_rays *rays,
+                     const struct gn_rt_packet_hits *hits, int lane, struct sample *s,
+                     struct tile_figures *figures)
 {
     const struct gn_surface *surface = &s->surface;
     struct gn_rt_hit hit;
     for (int k = 0; k < 3; k++)
-        s->dir[k] = sight->dir[k][lane];
-    s->dir_z = sight->dir_z[lane];
+        s->dir[k] = rays->dir[k][lane];
+    s->dir_z = rays->dir_z[lane];
     s->kind = SAMPLE_NOTHING;
     s->depth = INFINITY;
     s->is_receiver = s->is_cut = s->is_lit = false;
     s->shown = 0;
-    if (!(sight->hits.met >> lane & 1))
+    if (!(hits->met >> lane & 1))
         return;
-    gn_rt_get_hit(frame->rt, &sight->hits, lane, &hit);
+    gn_rt_get_hit(frame->rt, hits, lane, &hit);
     gn_scene_get_surface_filtered(frame->scene, s->dir, &hit, hit.distance * frame->pixel_angle,
                                   &s->surface);
     s->kind = surface->role == GN_RT_VIRTUAL ? SAMPLE_VIRTUAL : SAMPLE_REAL;
@@ -196,17 +216,18 @@ void gn_primary_trace(const struct frame *frame, struct sample *samples, int n,
                       struct tile_figures *figures)
 {
     for (int first = 0; first < n; first += LANES) {
-        struct sight sight;
+        struct sight_rays rays;
+        struct gn_rt_packet_hits hits;
         int n_lanes = n - first < LANES ? n - first : LANES;
         for (int i = 0; i < LANES; i++) {
             const struct sample *s = &samples[first + (i < n_lanes ? i : 0)];
             for (int k = 0; k < 3; k++)
-                sight.dir[k][i] = s->dir[k];
-            sight.dir_z[i] = s->dir_z;
-            sight.has_ray[i] = i < n_lanes && s->dir_z > 0;
+                rays.dir[k][i] = s->dir[k];
+            rays.dir_z[i] = s->dir_z;
+            rays.has_ray[i] = i < n_lanes && s->dir_z > 0;
         }
-        gn_primary_trace_block(frame, &sight, figures);
+        trace_block(frame, &rays, &hits, figures);
         for (int i = 0; i < n_lanes; i++)
-            gn_primary_take(frame, &sight, i, &samples[first + i], figures);
+            gn_primary_take(frame, &rays, &hits, i, &samples[first + i], figures);
     }
 }

@@ -12,6 +12,7 @@
 #include "common/clock.h"
 #include "server/render/caustics.h"
 #include "server/render/estimate.h"
+#include "server/render/kept.h"
 #include "server/render/kernels/kernels.h"
 #include "server/render/pass.h"
 #include "server/render/silhouette.h"
@@ -40,6 +41,7 @@ struct gn_renderer {
     bool *plain; // [blocks], see struct frame
     struct spot *spots;
     struct tile_figures *figures;
+    struct kept kept;
     struct gn_camera rays_camera; // whose rays these are; width 0: none yet
     bool has_pass_rays;           // through other points than the centres
     double slopes[4];
@@ -121,6 +123,7 @@ void gn_renderer_destroy(struct gn_renderer **renderer)
     free(self->plain);
     free(self->spots);
     free(self->figures);
+    gn_kept_finish(&self->kept);
     free(self);
 }
 
@@ -167,15 +170,9 @@ static int reserve_pixels(struct gn_renderer *renderer, int width, int height)
     renderer->features = calloc(n, sizeof(*renderer->features));
     renderer->figures = calloc(n_tiles, sizeof(*renderer->figures));
     renderer->plain = calloc(n_tiles * BLOCKS * BLOCKS, sizeof(*renderer->plain));
-    return renderer->rays && renderer->features && renderer->plain && renderer->figures ? 0
-                                                                                        : -ENOMEM;
-}
-
-static bool has_same_rays(const struct gn_camera *a, const struct gn_camera *b)
-{
-    return a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
-           a->cx == b->cx && a->cy == b->cy &&
-           memcmp(a->distortion, b->distortion, sizeof(a->distortion)) == 0;
+    if (!renderer->rays || !renderer->features || !renderer->plain || !renderer->figures)
+        return -ENOMEM;
+    return gn_kept_reserve(&renderer->kept, n_tiles * BLOCKS * BLOCKS);
 }
 
 /** The table of rays depends on the intrinsics only, and on the pass. The slopes' bounds hold for
@@ -183,7 +180,7 @@ static bool has_same_rays(const struct gn_camera *a, const struct gn_camera *b)
 static void update_rays(struct gn_renderer *renderer, const struct gn_camera *camera,
                         const struct pass *pass)
 {
-    bool is_same = has_same_rays(&renderer->rays_camera, camera);
+    bool is_same = gn_primary_has_same_rays(&renderer->rays_camera, camera);
     if (pass && is_same)
         gn_primary_make_rays(camera, pass, renderer->pool, renderer->rays, NULL);
     else if (!is_same || renderer->has_pass_rays)
@@ -468,6 +465,7 @@ static int render_frame(struct gn_renderer *renderer, struct frame *frame,
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");
     init_frame(frame, renderer);
+    gn_kept_begin(&renderer->kept, frame);
     gn_plan_make(frame, renderer->slopes, &report);
     ret = make_silhouettes(renderer, frame);
     if (ret < 0)
@@ -477,6 +475,7 @@ static int render_frame(struct gn_renderer *renderer, struct frame *frame,
     gn_tiles_render(frame, renderer->pool);
     if (is_cancelled(frame))
         return gn_error_set(out_error, -ECANCELED, "render: the frame was cancelled");
+    gn_kept_end(&renderer->kept, frame);
     ret = frame->pass ? 0 : gn_caustics_add(&renderer->caustics, frame, renderer->pool);
     if (ret < 0)
         return gn_error_set(out_error, ret, "render: out of memory");

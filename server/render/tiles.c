@@ -86,19 +86,6 @@ static void keep_feature(const struct frame *frame, int x, int y, const struct s
                                                 : 1);
 }
 
-/** Writes a block of pixels that show nothing of the virtual objects. */
-static void write_plain(const struct frame *frame, int x, int y, const struct sight *sight,
-                        struct tile_figures *figures)
-{
-    float depth[LANES];
-    for (int i = 0; i < LANES; i++) {
-        bool is_met = sight->hits.met >> i & 1;
-        depth[i] = is_met ? sight->hits.distance[i] * sight->dir_z[i] : INFINITY;
-    }
-    gn_layers_write_plain(frame, x, y, depth);
-    figures->n_receivers += (uint64_t)__builtin_popcount(sight->hits.met);
-}
-
 /** Where a block's pixels are. */
 static void get_corner(const struct frame *frame, int item, int block, int *out_x, int *out_y)
 {
@@ -106,58 +93,69 @@ static void get_corner(const struct frame *frame, int item, int block, int *out_
     *out_y = item / frame->tiles_x * TILE + block / BLOCKS * BLOCK;
 }
 
-/** Traces the rays of a tile's pixels. out_boxes: of what blocks see, out_known: where it is
- * known. */
-static void trace_tile(const struct frame *frame, struct scratch *scratch, int item,
-                       struct box *out_boxes, bool *out_known, struct tile_figures *figures)
+/** Traces the rays of a tile's pixels, or takes what is kept of them. Returns its blocks. */
+static const struct sight *see_blocks(const struct frame *frame, struct scratch *scratch, int item,
+                                      struct tile_figures *figures)
 {
+    struct sight *sights =
+        frame->kept ? frame->kept + (size_t)item * BLOCKS * BLOCKS : scratch->sights;
     struct box tile = EMPTY_BOX;
     for (int b = 0; b < BLOCKS * BLOCKS; b++) {
-        struct sight *sight = &scratch->sights[b];
-        int x;
-        int y;
-        get_corner(frame, item, b, &x, &y);
-        gn_primary_aim_block(frame, x, y, sight);
-        gn_primary_trace_block(frame, sight, figures);
-        out_known[b] = frame->skips && gn_primary_bound(frame, sight, &out_boxes[b]);
-        for (int k = 0; k < 3 && out_known[b]; k++) {
-            tile.min[k] = fminf(tile.min[k], out_boxes[b].min[k]);
-            tile.max[k] = fmaxf(tile.max[k], out_boxes[b].max[k]);
+        if (!frame->is_seen) {
+            struct sight_rays rays;
+            int x;
+            int y;
+            get_corner(frame, item, b, &x, &y);
+            gn_primary_aim_block(frame, x, y, &rays);
+            gn_primary_see_block(frame, &rays, &sights[b], figures);
+        }
+        for (int k = 0; k < 3 && sights[b].is_bounded; k++) {
+            tile.min[k] = fminf(tile.min[k], sights[b].box.min[k]);
+            tile.max[k] = fmaxf(tile.max[k], sights[b].box.max[k]);
         }
     }
     scratch->n_shadow_lights = 0;
-    if (frame->run_shadow && tile.min[0] <= tile.max[0])
+    if (frame->run_shadow && frame->skips && tile.min[0] <= tile.max[0])
         gn_shadow_list_lights(frame, scratch, &tile);
+    return sights;
+}
+
+/** Does the block show nothing of the virtual objects? */
+static bool is_plain(const struct frame *frame, const struct scratch *scratch,
+                     const struct sight *sight)
+{
+    return frame->skips && sight->is_bounded &&
+           (!frame->run_shadow || sight->hits.met == 0 ||
+            gn_shadow_is_free(frame, scratch, &sight->box));
 }
 
 /** Takes what a tile's pixels see where it is not plain. Returns the number of samples. */
 static int see_tile(const struct frame *frame, struct scratch *scratch, int item, int (*pixels)[2],
                     struct tile_figures *figures)
 {
-    struct box boxes[BLOCKS * BLOCKS];
-    bool is_known[BLOCKS * BLOCKS];
+    const struct sight *sights = see_blocks(frame, scratch, item, figures);
     int n = 0;
-    trace_tile(frame, scratch, item, boxes, is_known, figures);
     for (int b = 0; b < BLOCKS * BLOCKS; b++) {
-        const struct sight *sight = &scratch->sights[b];
+        struct sight_rays rays;
         int corner[2];
         get_corner(frame, item, b, &corner[0], &corner[1]);
         if (corner[0] >= frame->camera->width || corner[1] >= frame->camera->height)
             continue;
-        bool plain = is_known[b] && (!frame->run_shadow || sight->hits.met == 0 ||
-                                     gn_shadow_is_free(frame, scratch, &boxes[b]));
+        bool plain = is_plain(frame, scratch, &sights[b]);
         *gn_refine_plain_at(frame, corner[0], corner[1]) = plain;
         if (plain) {
-            write_plain(frame, corner[0], corner[1], sight, figures);
+            gn_layers_write_plain(frame, corner[0], corner[1], sights[b].depth);
+            figures->n_receivers += (uint64_t)__builtin_popcount(sights[b].hits.met);
             continue;
         }
+        gn_primary_aim_block(frame, corner[0], corner[1], &rays);
         for (int i = 0; i < LANES; i++) {
             int x = corner[0] + i % BLOCK;
             int y = corner[1] + i / BLOCK;
             if (x >= frame->camera->width || y >= frame->camera->height)
                 continue;
             struct sample *s = &scratch->samples[n];
-            gn_primary_take(frame, sight, i, s, figures);
+            gn_primary_take(frame, &rays, &sights[b].hits, i, s, figures);
             s->group = n;
             init_sample(frame, s, x, y, 0);
             pixels[n][0] = x;

@@ -351,6 +351,73 @@ static void test_what_lies_outside_the_picture(void **state)
     gn_test_stage_finish(&stage);
 }
 
+/** Renders and holds the picture against one of a renderer that never saw another. */
+static void check_kept_of(struct gn_test_stage *stage, const struct gn_render_options *options,
+                          bool is_kept)
+{
+    struct gn_renderer *used = stage->renderer;
+    size_t n;
+    gn_test_stage_render(stage, options);
+    struct gn_render_report report = stage->report;
+    float *some = copy_layers(&stage->layers, &n);
+    assert_int_equal(gn_renderer_create(stage->scene, stage->pool, &stage->renderer, NULL), 0);
+    gn_test_stage_render(stage, options);
+    float *fresh = copy_layers(&stage->layers, &n);
+    assert_true(stage->report.rays_primary > 0);
+    assert_int_equal(report.rays_primary, is_kept ? 0 : stage->report.rays_primary);
+    assert_same_bits(some, fresh, n);
+    gn_renderer_destroy(&stage->renderer);
+    stage->renderer = used;
+    stage->report = report;
+    free(some);
+    free(fresh);
+}
+
+static void check_kept(struct gn_test_stage *stage, bool is_kept)
+{
+    const struct gn_render_options options = {.single_ray = true};
+    check_kept_of(stage, &options, is_kept);
+}
+
+static void test_what_rests_is_seen_once(void **state)
+{
+    (void)state;
+    struct gn_test_stage stage = {0};
+    init_stage(&stage, ALL_THINGS, 2);
+    check_kept(&stage, false);
+    check_kept(&stage, false); // it rests: from now on it is kept
+    check_kept(&stage, true);
+    assert_left_out(&stage, "primary",
+                    "camera and scene rest: what the pixels' centres see is kept");
+    gn_test_stage_set_lights_from_map(&stage, 1); // other lights, other shadows
+    check_kept(&stage, true);
+    stage.camera.world_from_camera.translation[1] += 1e-9;
+    check_kept(&stage, false);
+    check_kept(&stage, false);
+    check_kept(&stage, true);
+    stage.camera.cx += 0.25;
+    check_kept(&stage, false);
+    check_kept(&stage, false);
+    stage.camera.world_from_camera.rotation[3] *= -1;
+    check_kept(&stage, false);
+    check_kept(&stage, false);
+    stage.camera.width -= 7;
+    check_kept(&stage, false);
+    check_kept(&stage, false);
+    check_kept(&stage, true);
+    const struct gn_render_options unseen = {.single_ray = true, .no_virtual = true};
+    check_kept_of(&stage, &unseen, false);
+    check_kept(&stage, false);
+    check_kept(&stage, false);
+    check_kept(&stage, true);
+    // Without the plan's rules every ray is traced.
+    const struct gn_render_options all = {.single_ray = true, .all_passes = true};
+    gn_test_stage_render(&stage, &all);
+    assert_true(stage.report.rays_primary > 0);
+    check_kept(&stage, true);
+    gn_test_stage_finish(&stage);
+}
+
 static void test_threads_change_no_bit(void **state)
 {
     (void)state;
@@ -462,6 +529,7 @@ int main(void)
         cmocka_unit_test(test_every_reason),
         cmocka_unit_test(test_objects_out_of_sight),
         cmocka_unit_test(test_what_lies_outside_the_picture),
+        cmocka_unit_test(test_what_rests_is_seen_once),
         cmocka_unit_test(test_threads_change_no_bit),
         cmocka_unit_test(test_a_warm_frame_takes_no_memory),
         cmocka_unit_test(test_what_is_refused),
