@@ -3,7 +3,6 @@
 /*
  * gnomon doctor: says what on this machine works.
  */
-#include <glob.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -12,6 +11,7 @@
 #include <png.h>
 
 #include "client/capture/gige.h"
+#include "client/capture/v4l2.h"
 #include "client/cmd.h"
 #include "client/feature.h"
 #include "common/thread.h"
@@ -101,18 +101,19 @@ static void say_gige(void *context, const char *id, const char *model, const cha
     say("ok", "GigE", text);
 }
 
+static void say_v4l2(void *context, int indent, const char *line)
+{
+    (void)context;
+    if (indent)
+        printf("%-17s   %s\n", "", line);
+    else
+        say("ok", "V4L2", line);
+}
+
 static void check_cameras(void)
 {
-    glob_t found = {0};
-    char text[512];
-    if (glob("/dev/video*", 0, NULL, &found) == 0 && found.gl_pathc > 0) {
-        snprintf(text, sizeof(text), "%zu device%s, the first %s; this build cannot read V4L2",
-                 found.gl_pathc, found.gl_pathc == 1 ? "" : "s", found.gl_pathv[0]);
-        say("no", "V4L2", text);
-    } else {
-        say("no", "V4L2", "no /dev/video* on this machine; this build cannot read V4L2");
-    }
-    globfree(&found);
+    if (gn_v4l2_describe_all(say_v4l2, NULL) == 0)
+        say("no", "V4L2", "no /dev/video* of this machine captures video");
     if (gn_gige_find(say_gige, NULL) == 0)
         say("no", "GigE", "no GigE Vision camera answers in the networks of this machine");
     say("ok", "files", "EXR, Radiance, PNG, JPEG; sequences of the capture rig");

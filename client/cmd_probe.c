@@ -44,7 +44,7 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon probe",
-    .usage = "--sequence DIR | --files PATTERN | --gige ID [OPTION]...",
+    .usage = "--sequence DIR | --files PATTERN | --gige ID | --v4l2 DEVICE [OPTION]...",
     .summary =
         "Streams environment frames to a room: what a camera behind a fisheye or in front of "
         "a mirror ball sees of the light. The server makes the room's lighting state of the "
@@ -111,7 +111,8 @@ static const char *find_misuse(const struct gn_options *options)
     if (misuse)
         return misuse;
     if (has_dir + has_files + gn_live_count_asked(options) != 1)
-        return "give --sequence DIR, --files PATTERN or a camera (--gige ID), one of them";
+        return "give --sequence DIR, --files PATTERN or a camera (--gige ID, --v4l2 DEVICE), one "
+               "of them";
     if (has_dir + has_setup + has_projection > 1)
         return "the setup comes from --sequence, --setup or --projection, one of them";
     return NULL;

@@ -98,8 +98,9 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon view",
-    .usage = "--sequence DIR | {--files PATTERN | --gige ID} --camera FILE, --out DIR "
-             "[OPTION]...",
+    .usage =
+        "--sequence DIR | {--files PATTERN | --gige ID | --v4l2 DEVICE} --camera FILE, --out DIR "
+        "[OPTION]...",
     .summary = "Streams camera frames and poses to a room and writes the composited frames that "
                "come back, with their receipts. Every frame comes back exactly once, as a result "
                "or as dropped with the reason. At the start it waits up to 5 s for light.",
@@ -145,7 +146,8 @@ static const char *find_misuse(const struct gn_options *options)
     if (misuse)
         return misuse;
     if (has_dir + has_files + gn_live_count_asked(options) != 1 || has_dir == has_camera)
-        return "give --sequence DIR, or --files PATTERN or a camera (--gige ID) with --camera FILE";
+        return "give --sequence DIR, or --files PATTERN or a camera (--gige ID, --v4l2 DEVICE) "
+               "with --camera FILE";
     if (gn_options_get_double(options, NULL, NULL, "budget-ms") > 0 &&
         gn_options_get_enum(options, NULL, NULL, "quality") != 0)
         return "--budget-ms is for --quality interactive: the others' settings are not chosen";

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "client/capture/gige.h"
+#include "client/capture/v4l2.h"
 #include "proto/attr.h"
 
 /** Most pixels a side of a picture has. */
@@ -17,6 +18,7 @@ static const struct {
                 struct gn_error *out_error);
 } kinds[] = {
     {"gige", gn_gige_open},
+    {"v4l2", gn_v4l2_open},
 };
 
 int gn_live_count_asked(const struct gn_options *options)
@@ -31,6 +33,7 @@ const char *gn_live_find_misuse(const struct gn_options *options)
 {
     static const char *const settings[] = {"frame-size", "frame-rate", "exposure-us", "gain",
                                            "pixel-format"};
+    static const char *const own[] = {"lock-white-balance", "controls"};
     int n_cameras = gn_live_count_asked(options);
     if (n_cameras > 1)
         return "one camera can be read, not several";
@@ -38,6 +41,11 @@ const char *gn_live_find_misuse(const struct gn_options *options)
         if (gn_options_is_set(options, NULL, NULL, settings[i]))
             return "--frame-size, --frame-rate, --exposure-us, --gain and --pixel-format are for "
                    "cameras, and none is named";
+    }
+    bool is_v4l2 = gn_options_is_set(options, NULL, NULL, "v4l2");
+    for (size_t i = 0; !is_v4l2 && i < GN_ARRAY_LEN(own); i++) {
+        if (gn_options_is_set(options, NULL, NULL, own[i]))
+            return "--lock-white-balance and --controls are for --v4l2 cameras";
     }
     return NULL;
 }
@@ -75,6 +83,8 @@ int gn_live_open(const struct gn_options *options, const struct gn_live_options 
     if (live.has_gain)
         live.gain = gn_options_get_double(options, NULL, NULL, "gain");
     live.pixel_format = gn_options_get_string(options, NULL, NULL, "pixel-format");
+    live.is_white_balance_locked = gn_options_get_bool(options, NULL, NULL, "lock-white-balance");
+    live.controls = gn_options_get_string(options, NULL, NULL, "controls");
     for (size_t i = 0; i < GN_ARRAY_LEN(kinds); i++) {
         live.id = gn_options_get_string(options, NULL, NULL, kinds[i].flag);
         if (live.id)
@@ -88,10 +98,11 @@ void gn_live_print_counts(const struct gn_source *source, FILE *out)
     struct gn_source_counts c;
     gn_source_get_counts(source, &c);
     fprintf(out,
-            "camera: %llu whole pictures, %llu incomplete, %llu skipped for newer ones; %llu "
-            "packets lost, %llu resent; opened again %llu times; %.2f copies a picture\n",
+            "camera: %llu whole pictures, %llu incomplete, %llu lost, %llu skipped for newer ones; "
+            "%llu packets lost, %llu resent; opened again %llu times; %.2f copies a picture\n",
             (unsigned long long)c.n_complete, (unsigned long long)c.n_incomplete,
-            (unsigned long long)c.n_skipped, (unsigned long long)c.n_lost_packets,
-            (unsigned long long)c.n_resent_packets, (unsigned long long)c.n_reopened,
+            (unsigned long long)c.n_lost, (unsigned long long)c.n_skipped,
+            (unsigned long long)c.n_lost_packets, (unsigned long long)c.n_resent_packets,
+            (unsigned long long)c.n_reopened,
             c.read_bytes ? (double)c.copied_bytes / (double)c.read_bytes : 0);
 }

@@ -21,6 +21,12 @@
      .value_name = "ID",                                                                           \
      .help = "A GigE Vision camera, by its id (gnomon doctor lists them), serial number or "       \
              "address; any: the first that is found."},                                            \
+        {.key = "v4l2",                                                                            \
+         .flag = "v4l2",                                                                           \
+         .type = GN_OPTION_STRING,                                                                 \
+         .value_name = "DEVICE",                                                                   \
+         .help = "A camera of the Linux kernel, such as /dev/video0 (gnomon doctor lists them "    \
+                 "and what they offer); any: the first."},                                         \
         {.key = "frame-size",                                                                      \
          .flag = "frame-size",                                                                     \
          .type = GN_OPTION_STRING,                                                                 \
@@ -47,12 +53,22 @@
          .min = -1e6,                                                                              \
          .max = 1e6,                                                                               \
          .value_name = "G",                                                                        \
-         .help = "The camera's gain in its own unit (dB with GenICam); its automatic is then "     \
+         .help = "The camera's gain in its own unit (dB with GigE); its automatic is then "        \
                  "off."},                                                                          \
+        {.key = "lock-white-balance",                                                              \
+         .flag = "lock-white-balance",                                                             \
+         .type = GN_OPTION_BOOL,                                                                   \
+         .help = "With --v4l2: the camera's automatic white balance is off."},                     \
+        {.key = "controls",                                                                        \
+         .flag = "controls",                                                                       \
+         .type = GN_OPTION_STRING,                                                                 \
+         .value_name = "NAME=N,...",                                                               \
+         .help = "With --v4l2: any other settings of the camera, by its own names."},              \
     {                                                                                              \
         .key = "pixel-format", .flag = "pixel-format", .type = GN_OPTION_STRING,                   \
         .value_name = "NAME",                                                                      \
-        .help = "The camera's own name of a pixel format, such as Mono12p; without it the one "    \
+        .help = "The camera's own name of a pixel format, such as Mono12p or YUYV; without it "    \
+                "the one "                                                                         \
                 "that tells most."                                                                 \
     }
 

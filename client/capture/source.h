@@ -51,6 +51,7 @@ struct gn_capture {
 struct gn_source_counts {
     uint64_t n_complete;       // whole pictures that came from the camera
     uint64_t n_incomplete;     // pictures with parts missing: never given out
+    uint64_t n_lost;           // pictures that never came: gaps in the camera's numbers
     uint64_t n_skipped;        // whole pictures that a newer one replaced before they were read
     uint64_t n_lost_packets;   // that never came
     uint64_t n_resent_packets; // that came when asked for again
@@ -87,6 +88,8 @@ struct gn_live_options {
     bool has_gain;
     double gain;              // in the camera's own unit, dB with GenICam; automatic gain off
     const char *pixel_format; // the camera's own name; NULL: the best that we can read
+    bool is_white_balance_locked;
+    const char *controls; // "NAME=VALUE,..." by the camera's own names; NULL: none
 };
 
 /**

@@ -211,11 +211,11 @@ static int print_counts(char *text, size_t size, const struct gn_source_counts *
 {
     return snprintf(text, size,
                     "\"capture\": {\"complete\": %" PRIu64 ", \"incomplete\": %" PRIu64
-                    ", \"skipped\": %" PRIu64 ", \"lost_packets\": %" PRIu64
+                    ", \"lost\": %" PRIu64 ", \"skipped\": %" PRIu64 ", \"lost_packets\": %" PRIu64
                     ", \"resent_packets\": %" PRIu64 ", \"reopened\": %" PRIu64
                     ", \"read\": %" PRIu64 ", \"read_bytes\": %" PRIu64
                     ", \"copied_bytes\": %" PRIu64 "},\n",
-                    c->n_complete, c->n_incomplete, c->n_skipped, c->n_lost_packets,
+                    c->n_complete, c->n_incomplete, c->n_lost, c->n_skipped, c->n_lost_packets,
                     c->n_resent_packets, c->n_reopened, c->n_read, c->read_bytes, c->copied_bytes);
 }
 

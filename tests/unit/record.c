@@ -91,7 +91,8 @@ static void test_run(void **state)
                                             .n_reopened = 6,
                                             .n_read = 7,
                                             .read_bytes = UINT64_C(8) << 40,
-                                            .copied_bytes = 9};
+                                            .copied_bytes = 9,
+                                            .n_lost = 10};
     assert_int_equal(gn_record_close(&record, 3, false, &counts, NULL), 0);
     assert_null(record);
     assert_int_equal(gn_record_close(&record, 0, true, NULL, NULL), 0);
@@ -128,6 +129,7 @@ static void test_run(void **state)
         assert_int_equal(get_int(capture, keys[i]), i + 1);
     assert_true(get_int(capture, "read_bytes") == INT64_C(8) << 40);
     assert_int_equal(get_int(capture, "copied_bytes"), 9);
+    assert_int_equal(get_int(capture, "lost"), 10);
     json_decref(root);
 }
 
