@@ -1,0 +1,182 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "tests/rig/marker_picture.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+
+const double gn_rig_paper = 0.80, gn_rig_ink = 0.035, gn_rig_backdrop = 0.18;
+
+enum { POINTS = 16 };
+
+/** What a ray meets: its linear value, and a number that differs from cell to cell. */
+struct met {
+    double value;
+    int what;
+};
+
+/** A sheet as the camera has it: its frame's origin and axes in the camera's. */
+struct placed {
+    const struct gn_rig_sheet *sheet;
+    double eye[3];     // the camera's place in the sheet's frame
+    double turn[3][3]; // sheet_from_camera
+};
+
+static void place(const struct gn_rig_view *view, const struct gn_rig_sheet *sheet,
+                  struct placed *out)
+{
+    const double *w = view->world_from_camera, *s = sheet->world_from_sheet;
+    out->sheet = sheet;
+    for (int i = 0; i < 3; i++) {
+        out->eye[i] = 0;
+        for (int k = 0; k < 3; k++)
+            out->eye[i] += s[4 * k + i] * (w[4 * k + 3] - s[4 * k + 3]);
+        for (int j = 0; j < 3; j++) {
+            out->turn[i][j] = 0;
+            for (int k = 0; k < 3; k++)
+                out->turn[i][j] += s[4 * k + i] * w[4 * k + j];
+        }
+    }
+}
+
+static struct met look(const struct placed *sheets, int n_sheets, const double ray[static 2])
+{
+    struct met met = {gn_rig_backdrop, 0};
+    double nearest = INFINITY;
+    for (int s = 0; s < n_sheets; s++) {
+        const struct gn_rig_sheet *sheet = sheets[s].sheet;
+        double d[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = sheets[s].turn[k][0] * ray[0] + sheets[s].turn[k][1] * ray[1] +
+                   sheets[s].turn[k][2];
+        const double *eye = sheets[s].eye;
+        double t = -eye[2] / d[2];
+        double x = eye[0] + t * d[0], y = eye[1] + t * d[1];
+        if (!(eye[2] > 0 && t > 0 && t < nearest && fabs(x) <= sheet->half_width &&
+              fabs(y) <= sheet->half_height))
+            continue;
+        nearest = t;
+        met = (struct met){gn_rig_paper, 100000 * (s + 1)};
+        for (int i = 0; i < sheet->n_printed; i++) {
+            const struct gn_rig_printed *q = &sheet->printed[i];
+            double u = (x - q->x) / q->size + 0.5, v = 0.5 - (y - q->y) / q->size;
+            if (!(u >= 0 && u < 1 && v >= 0 && v < 1))
+                continue;
+            int cell = (int)(v * q->cells) * q->cells + (int)(u * q->cells);
+            met.value = q->white[cell] ? gn_rig_paper : gn_rig_ink;
+            met.what += 1 + 100 * i + cell;
+        }
+    }
+    return met;
+}
+
+int gn_rig_marker_camera_init(struct gn_rig_marker_camera *camera, const struct gn_rig_view *view)
+{
+    struct gn_rig_view still = *view;
+    size_t n = (size_t)(2 * view->width + 1) * (size_t)(2 * view->height + 1);
+    *camera = (struct gn_rig_marker_camera){.view = *view};
+    camera->rays = malloc(n * 2 * sizeof(*camera->rays));
+    if (!camera->rays)
+        return -ENOMEM;
+    for (int i = 0; i < 16; i++)
+        still.world_from_camera[i] = i % 5 == 0;
+    double *ray = camera->rays;
+    for (int y = 0; y <= 2 * view->height; y++) {
+        for (int x = 0; x <= 2 * view->width; x++, ray += 2) {
+            double dir[3];
+            gn_rig_view_get_ray(&still, 0.5 * x, 0.5 * y, dir);
+            ray[0] = dir[0] / dir[2];
+            ray[1] = dir[1] / dir[2];
+        }
+    }
+    return 0;
+}
+
+void gn_rig_marker_camera_finish(struct gn_rig_marker_camera *camera)
+{
+    free(camera->rays);
+    *camera = (struct gn_rig_marker_camera){0};
+}
+
+/** The mean over a pixel; ray: at its top left corner. Between half pixels the lens is linear. */
+static double get_mean(const struct placed *sheets, int n_sheets, const double *ray, long stride)
+{
+    double sum = 0;
+    for (int i = 0; i < POINTS * POINTS; i++) {
+        double u = 2 * (i % POINTS + 0.5) / POINTS, v = 2 * (i / POINTS + 0.5) / POINTS;
+        const double *r = ray + 2 * ((v >= 1) * stride + (u >= 1));
+        const double *s = r + 2 * stride;
+        double p[2];
+        u -= u >= 1;
+        v -= v >= 1;
+        for (int k = 0; k < 2; k++)
+            p[k] = (1 - v) * ((1 - u) * r[k] + u * r[2 + k]) + v * ((1 - u) * s[k] + u * s[2 + k]);
+        sum += look(sheets, n_sheets, p).value;
+    }
+    return sum / (POINTS * POINTS);
+}
+
+/** One pass of the normal point spread along x (step 1) or y (step width). */
+static void blur_line(const float *in, float *out, int n, long step, double deviation)
+{
+    int reach = (int)ceil(4 * deviation);
+    for (int i = 0; i < n; i++) {
+        double sum = 0, weights = 0;
+        for (int k = -reach; k <= reach; k++) {
+            int at = i + k < 0 ? 0 : i + k >= n ? n - 1 : i + k;
+            double weight = exp(-0.5 * k * k / (deviation * deviation));
+            sum += weight * (double)in[at * step];
+            weights += weight;
+        }
+        out[i * step] = (float)(sum / weights);
+    }
+}
+
+/** mean[height][width] of each pixel's square. */
+static void expose(const struct gn_rig_marker_camera *camera, const struct placed *sheets,
+                   int n_sheets, struct met *met, float *mean)
+{
+    long w = camera->view.width, h = camera->view.height, stride = 2 * w + 1;
+    for (long i = 0; i < stride * (2 * h + 1); i++)
+        met[i] = look(sheets, n_sheets, camera->rays + 2 * i);
+    for (long i = 0; i < w * h; i++) {
+        long at = 2 * (i / w) * stride + 2 * (i % w);
+        bool is_even = true;
+        for (int k = 0; k < 9; k++)
+            is_even = is_even && met[at + k / 3 * stride + k % 3].what == met[at].what;
+        mean[i] = (float)(is_even ? met[at].value
+                                  : get_mean(sheets, n_sheets, camera->rays + 2 * at, stride));
+    }
+}
+
+int gn_rig_take_markers(const struct gn_rig_marker_camera *camera,
+                        const struct gn_rig_sheet *sheets, int n_sheets,
+                        struct gn_image *out_linear)
+{
+    long w = camera->view.width, h = camera->view.height;
+    struct placed *placed = calloc((size_t)n_sheets + 1, sizeof(*placed));
+    struct met *met = malloc((size_t)((2 * w + 1) * (2 * h + 1)) * sizeof(*met));
+    float *mean = malloc((size_t)(w * h) * sizeof(*mean));
+    float *spread = malloc((size_t)(w * h) * sizeof(*spread));
+    int err =
+        placed && met && mean && spread ? gn_image_init(out_linear, (int)w, (int)h, 3) : -ENOMEM;
+    if (err)
+        goto out;
+    for (int i = 0; i < n_sheets; i++)
+        place(&camera->view, &sheets[i], &placed[i]);
+    expose(camera, placed, n_sheets, met, mean);
+    double blur_px = camera->view.blur_px;
+    for (long y = 0; y < h && blur_px > 0; y++)
+        blur_line(mean + y * w, spread + y * w, (int)w, 1, blur_px);
+    for (long x = 0; x < w && blur_px > 0; x++)
+        blur_line(spread + x, mean + x, (int)h, w, blur_px);
+    for (long i = 0; i < 3 * w * h; i++)
+        out_linear->data[i] = mean[i / 3];
+out:
+    free(placed);
+    free(met);
+    free(mean);
+    free(spread);
+    return err;
+}
