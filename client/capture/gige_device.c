@@ -1,0 +1,327 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/capture/gige_device.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <arv.h>
+
+#include "common/clock.h"
+
+#define N_BUFFERS 6
+/** Bounds of what a camera may announce. */
+#define MAX_PICTURE_BYTES (64 << 20)
+#define MAX_EXTRA_BYTES (1 << 20) // chunks behind the picture
+/** Receive buffer; the kernel cuts it to net.core.rmem_max. Without CAP_NET_RAW Aravis receives by
+ * a plain socket, and with the usual 208 KiB most of a picture is lost. */
+#define SOCKET_BUFFER_BYTES (8 << 20)
+#define GVCP_PORT 3956
+/** How often control is asked for again. */
+#define CONTROL_RETRY_US 200000
+
+static int set_arv_error(struct gn_error *out_error, int err, const struct gn_gige_place *place,
+                         const char *what, GError **error)
+{
+    gn_error_set(out_error, err, "camera %s: %s: %s", place->id, what,
+                 *error ? (*error)->message : "no reason given");
+    g_clear_error(error);
+    return err;
+}
+
+static bool is_same(const char *a, const char *b)
+{
+    return a && strcmp(a, b) == 0;
+}
+
+/** An address that is given needs no search, and may lie behind a router. Whether it is one. */
+static bool make_place(const char *address, struct gn_gige_place *out_place)
+{
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(GVCP_PORT)}, from = {0};
+    socklen_t length = sizeof(from);
+    if (inet_pton(AF_INET, address, &to.sin_addr) != 1)
+        return false;
+    memset(out_place, 0, sizeof(*out_place));
+    snprintf(out_place->id, sizeof(out_place->id), "%s", address);
+    snprintf(out_place->address, sizeof(out_place->address), "%s", address);
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (const struct sockaddr *)&to, sizeof(to)) == 0 &&
+        getsockname(fd, (struct sockaddr *)&from, &length) == 0)
+        (void)!inet_ntop(AF_INET, &from.sin_addr, out_place->interface,
+                         sizeof(out_place->interface));
+    if (fd >= 0)
+        close(fd);
+    return true;
+}
+
+int gn_gige_place_find(const char *id, struct gn_gige_place *out_place, struct gn_error *out_error)
+{
+    if (make_place(id, out_place)) {
+        if (out_place->interface[0] && gn_gige_place_answers(out_place))
+            return 0;
+        return gn_error_set(out_error, -ENODEV,
+                            "--gige %s: no GigE Vision camera answers at this address", id);
+    }
+    ArvInterface *gv = arv_gv_interface_get_instance();
+    arv_interface_update_device_list(gv);
+    unsigned n = arv_interface_get_n_devices(gv);
+    char found[256] = "";
+    for (unsigned i = 0; i < n; i++) {
+        const char *device_id = arv_interface_get_device_id(gv, i);
+        const char *address = arv_interface_get_device_address(gv, i);
+        if (strcmp(id, "any") == 0 || is_same(device_id, id) || is_same(address, id) ||
+            is_same(arv_interface_get_device_physical_id(gv, i), id) ||
+            is_same(arv_interface_get_device_serial_nbr(gv, i), id)) {
+            memset(out_place, 0, sizeof(*out_place));
+            snprintf(out_place->id, sizeof(out_place->id), "%s", device_id ? device_id : id);
+            snprintf(out_place->address, sizeof(out_place->address), "%s", address ? address : "");
+            return 0;
+        }
+        size_t length = strlen(found);
+        snprintf(found + length, sizeof(found) - length, "%s%s", i ? ", " : "", device_id);
+    }
+    if (n == 0)
+        return gn_error_set(out_error, -ENODEV,
+                            "--gige %s: no GigE Vision camera answers in the networks of this "
+                            "machine",
+                            id);
+    return gn_error_set(out_error, -ENODEV, "--gige %s: no such camera; there are: %s", id, found);
+}
+
+bool gn_gige_place_answers(const struct gn_gige_place *place)
+{
+    // GVCP DISCOVERY_CMD: key, flag "acknowledge", command, no payload, request id (GigE
+    // Vision 2.0, 16.2). Its answer is DISCOVERY_ACK.
+    static const uint8_t command[8] = {0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01};
+    uint8_t answer[512];
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(GVCP_PORT)};
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    bool is_there = false;
+    if (fd >= 0 && inet_pton(AF_INET, place->address, &to.sin_addr) == 1 &&
+        connect(fd, (const struct sockaddr *)&to, sizeof(to)) == 0 &&
+        send(fd, command, sizeof(command), MSG_NOSIGNAL) == (ssize_t)sizeof(command)) {
+        struct pollfd wait = {.fd = fd, .events = POLLIN};
+        is_there = poll(&wait, 1, 100) == 1 && recv(fd, answer, sizeof(answer), 0) >= 8 &&
+                   answer[2] == 0x00 && answer[3] == 0x03;
+    }
+    if (fd >= 0)
+        close(fd);
+    return is_there;
+}
+
+/** Opens the device: where its interface is known, without asking all networks for it. */
+static ArvDevice *open_device(const struct gn_gige_place *place, GError **error)
+{
+    if (!place->interface[0])
+        return arv_interface_open_device(arv_gv_interface_get_instance(), place->id, error);
+    GInetAddress *interface = g_inet_address_new_from_string(place->interface);
+    GInetAddress *address = g_inet_address_new_from_string(place->address);
+    ArvDevice *device = NULL;
+    if (interface && address)
+        device = arv_gv_device_new(interface, address, error);
+    g_clear_object(&interface);
+    g_clear_object(&address);
+    return device;
+}
+
+static void copy_address(GSocketAddress *socket_address, char *out, size_t size)
+{
+    GInetAddress *address =
+        g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(socket_address));
+    char *text = g_inet_address_to_string(address);
+    snprintf(out, size, "%s", text);
+    g_free(text);
+}
+
+/** A client that died keeps the camera until its heartbeat is missed, 3 s with most. */
+static int take_control(ArvGvDevice *device, const struct gn_gige_place *place, int patience_ms,
+                        struct gn_error *out_error)
+{
+    int64_t deadline_ns = gn_clock_get_monotonic_ns() + patience_ms * GN_NS_PER_MS;
+    while (!arv_gv_device_is_controller(device)) {
+        if (gn_clock_get_monotonic_ns() > deadline_ns)
+            return gn_error_set(out_error, -EBUSY,
+                                "camera %s: another program controls it; end that first",
+                                place->id);
+        g_usleep(CONTROL_RETRY_US);
+        (void)!arv_gv_device_take_control(device, NULL);
+    }
+    return 0;
+}
+
+/** How well a format serves: more bits first, then colour, then what need not be copied. */
+static int rate_format(const struct gn_pixels_format *f, bool is_8_bit)
+{
+    int bits = is_8_bit ? 8 - abs(f->bits - 8) : f->bits;
+    return 100 * bits + 10 * (f->kind != GN_PIXELS_MONO) + (f->packing == GN_PIXELS_UNPACKED) * 2 +
+           gn_pixels_is_same(f, is_8_bit);
+}
+
+/** The best of the camera's formats; NULL: none that we read. */
+static const struct gn_pixels_format *choose_format(ArvCamera *camera, bool is_8_bit)
+{
+    const struct gn_pixels_format *best = NULL;
+    guint n = 0;
+    gint64 *codes = arv_camera_dup_available_pixel_formats(camera, &n, NULL);
+    for (guint i = 0; i < n; i++) {
+        const struct gn_pixels_format *f = gn_pixels_find((uint32_t)codes[i]);
+        if (f && (!best || rate_format(f, is_8_bit) > rate_format(best, is_8_bit)))
+            best = f;
+    }
+    g_free(codes);
+    return best;
+}
+
+static int set_format(struct gn_gige_device *d, const struct gn_gige_place *place,
+                      const struct gn_live_options *options, struct gn_error *out_error)
+{
+    GError *error = NULL;
+    if (options->pixel_format)
+        arv_camera_set_pixel_format_from_string(d->camera, options->pixel_format, &error);
+    else if (choose_format(d->camera, options->is_8_bit))
+        arv_camera_set_pixel_format(d->camera, choose_format(d->camera, options->is_8_bit)->code,
+                                    &error);
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "cannot set --pixel-format", &error);
+    ArvPixelFormat code = arv_camera_get_pixel_format(d->camera, &error);
+    if (error)
+        return set_arv_error(out_error, -EIO, place, "cannot read its pixel format", &error);
+    d->format = gn_pixels_find(code);
+    if (!d->format)
+        return gn_error_set(out_error, -ENOTSUP,
+                            "camera %s: pixel format 0x%08x cannot be read; what can: %s",
+                            place->id, code, gn_pixels_get_names());
+    return 0;
+}
+
+static int set_size(struct gn_gige_device *d, const struct gn_gige_place *place,
+                    const struct gn_live_options *options, struct gn_error *out_error)
+{
+    GError *error = NULL;
+    int x, y;
+    if (options->width > 0)
+        arv_camera_set_region(d->camera, -1, -1, options->width, options->height, &error);
+    if (!error)
+        arv_camera_get_region(d->camera, &x, &y, &d->width, &d->height, &error);
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "cannot set the size of its pictures",
+                             &error);
+    if (options->width > 0 && (d->width != options->width || d->height != options->height))
+        return gn_error_set(out_error, -EINVAL,
+                            "camera %s: asked for pictures of %dx%d, it gives %dx%d", place->id,
+                            options->width, options->height, d->width, d->height);
+    d->picture_bytes = gn_pixels_get_bytes(d->format, d->width, d->height);
+    int least = d->format->kind == GN_PIXELS_BAYER ? 2 : 1;
+    if (d->picture_bytes == 0 || d->picture_bytes > MAX_PICTURE_BYTES || d->width < least ||
+        d->height < least)
+        return gn_error_set(out_error, -EINVAL,
+                            "camera %s: its pictures of %dx%d %s cannot be; sides are in [%d, "
+                            "16384], a picture has at most %d MiB",
+                            place->id, d->width, d->height, d->format->name, least,
+                            MAX_PICTURE_BYTES >> 20);
+    return 0;
+}
+
+/** Rate, exposure and gain: set where asked for, read where it says. */
+static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *place,
+                        const struct gn_live_options *options, struct gn_error *out_error)
+{
+    GError *error = NULL;
+    ArvCamera *c = d->camera;
+    arv_camera_set_acquisition_mode(c, ARV_ACQUISITION_MODE_CONTINUOUS, NULL);
+    if (options->exposure_us > 0) {
+        if (arv_camera_is_exposure_auto_available(c, NULL))
+            arv_camera_set_exposure_time_auto(c, ARV_AUTO_OFF, NULL);
+        arv_camera_set_exposure_time(c, options->exposure_us, &error);
+    }
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "cannot set --exposure-us", &error);
+    if (options->has_gain) {
+        if (arv_camera_is_gain_auto_available(c, NULL))
+            arv_camera_set_gain_auto(c, ARV_AUTO_OFF, NULL);
+        arv_camera_set_gain(c, options->gain, &error);
+    }
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "cannot set --gain", &error);
+    if (options->frame_rate_hz > 0)
+        arv_camera_set_frame_rate(c, options->frame_rate_hz, &error);
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "cannot set --frame-rate", &error);
+    // What it does not say is 0.
+    d->frame_rate_hz = arv_camera_get_frame_rate(c, NULL);
+    d->exposure_us = arv_camera_get_exposure_time(c, NULL);
+    return 0;
+}
+
+static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *place,
+                        struct gn_error *out_error)
+{
+    GError *error = NULL;
+    size_t payload = arv_camera_get_payload(d->camera, &error);
+    if (error)
+        return set_arv_error(out_error, -EIO, place, "cannot read its payload size", &error);
+    if (payload < d->picture_bytes || payload > d->picture_bytes + MAX_EXTRA_BYTES)
+        return gn_error_set(
+            out_error, -EINVAL, "camera %s: %zu bytes a picture announced, but %dx%d %s has %zu",
+            place->id, payload, d->width, d->height, d->format->name, d->picture_bytes);
+    d->stream = arv_camera_create_stream(d->camera, NULL, NULL, &error);
+    if (!d->stream || error)
+        return set_arv_error(out_error, -EIO, place, "cannot open its stream", &error);
+    g_object_set(d->stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED,
+                 "socket-buffer-size", SOCKET_BUFFER_BYTES, NULL);
+    for (int i = 0; i < N_BUFFERS; i++)
+        arv_stream_push_buffer(d->stream, arv_buffer_new_allocate(payload));
+    arv_camera_start_acquisition(d->camera, &error);
+    if (error)
+        return set_arv_error(out_error, -EIO, place, "cannot start it", &error);
+    return 0;
+}
+
+int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_options *options,
+                        int patience_ms, struct gn_gige_device *out_device,
+                        struct gn_error *out_error)
+{
+    struct gn_gige_device d = {0};
+    GError *error = NULL;
+    ArvDevice *device = open_device(place, &error);
+    int err;
+    if (!device)
+        return set_arv_error(out_error, -EIO, place, "cannot open it", &error);
+    d.camera = arv_camera_new_with_device(device, &error);
+    if (!d.camera)
+        err = set_arv_error(out_error, -EIO, place, "cannot open it", &error);
+    else
+        err = take_control(ARV_GV_DEVICE(device), place, patience_ms, out_error);
+    if (!err)
+        err = set_format(&d, place, options, out_error);
+    if (!err)
+        err = set_size(&d, place, options, out_error);
+    if (!err)
+        err = set_exposure(&d, place, options, out_error);
+    if (!err)
+        err = start_stream(&d, place, out_error);
+    if (!err) {
+        ArvGvDevice *gv = ARV_GV_DEVICE(device);
+        copy_address(arv_gv_device_get_device_address(gv), place->address, sizeof(place->address));
+        copy_address(arv_gv_device_get_interface_address(gv), place->interface,
+                     sizeof(place->interface));
+        *out_device = d;
+    } else {
+        gn_gige_device_close(&d);
+    }
+    g_object_unref(device);
+    return err;
+}
+
+void gn_gige_device_close(struct gn_gige_device *device)
+{
+    if (device->camera && device->stream)
+        arv_camera_stop_acquisition(device->camera, NULL);
+    g_clear_object(&device->stream);
+    g_clear_object(&device->camera);
+}

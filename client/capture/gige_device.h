@@ -1,0 +1,55 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * One opened GigE Vision camera, set up and streaming: what gige.c keeps open. Aravis' types stay
+ * incomplete here.
+ */
+#ifndef GN_CLIENT_CAPTURE_GIGE_DEVICE_H
+#define GN_CLIENT_CAPTURE_GIGE_DEVICE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "client/capture/pixels.h"
+#include "client/capture/source.h"
+#include "common/error.h"
+#include "proto/attr.h"
+
+/** Where a camera was found. */
+struct gn_gige_place {
+    char id[128];       // Aravis' name of it: maker-serial number
+    char address[64];   // of the camera
+    char interface[64]; // of ours that reaches it
+};
+
+/** Values. The objects are owned; all NULL: not open. */
+struct gn_gige_device {
+    struct _ArvCamera *camera; // ArvCamera
+    struct _ArvStream *stream; // ArvStream
+    const struct gn_pixels_format *format;
+    int width, height;
+    size_t picture_bytes; // of one picture as the camera sends it
+    double frame_rate_hz; // 0: it does not say
+    double exposure_us;   // 0: it does not say
+};
+
+/** Looks for a camera by id, serial number, address, or any. 0, or -ENODEV and a sentence. */
+GN_MUST_USE int gn_gige_place_find(const char *id, struct gn_gige_place *out_place,
+                                   struct gn_error *out_error);
+
+/** Asks the camera at that place for a sign of life, for 100 ms. */
+bool gn_gige_place_answers(const struct gn_gige_place *place);
+
+/**
+ * Opens, takes control, sets everything that options ask for and starts the stream. patience_ms:
+ * how long another program's (or a dead client's) control is waited for. Returns 0, -EBUSY, or
+ * another negative errno, and a sentence.
+ */
+GN_MUST_USE int gn_gige_device_open(struct gn_gige_place *place,
+                                    const struct gn_live_options *options, int patience_ms,
+                                    struct gn_gige_device *out_device, struct gn_error *out_error);
+
+/** Ends the stream and gives the camera up; takes seconds where it does not answer any more. */
+void gn_gige_device_close(struct gn_gige_device *device);
+
+#endif
