@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "common/exr.h"
-#include "tests/rig/font.h"
+#include "common/font.h"
 #include "tests/rig/sequence.h"
 #include "tests/rig/view.h"
 
@@ -56,7 +56,7 @@ static void draw_text(struct gn_image8 *image, int x, int y, int zoom, const uns
         int c = toupper((unsigned char)*text) & 127;
         for (int row = 0; row < 7; row++)
             for (int column = 0; column < 5; column++)
-                if (gn_rig_font[c][row] >> (4 - column) & 1)
+                if (gn_font_rows[c][row] >> (4 - column) & 1)
                     fill(image, x + column * zoom, y + row * zoom, zoom, zoom, rgb);
     }
 }
