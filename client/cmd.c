@@ -50,9 +50,10 @@ static const char *get_hint(int err)
     }
 }
 
-int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
-                   enum gn_msg_role role, struct gn_client **out_client, struct gn_error *out_error)
+int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
+                      struct gn_error *out_error)
 {
+    const struct gn_options *options = link->options;
     struct gn_address server = gn_options_get_address(options, NULL, NULL, "server");
     const char *text = gn_options_get_string(options, NULL, NULL, "server");
     *out_client = NULL;
@@ -62,11 +63,13 @@ int gn_cmd_connect(const struct gn_program *program, const struct gn_options *op
     struct gn_client_options client_options = {
         .host = server.host,
         .port = server.port,
-        .role = role,
+        .role = link->role,
         .room = gn_options_get_string(options, NULL, NULL, "room"),
         .token = gn_options_get_string(options, NULL, NULL, "token"),
-        .client_name = program->name,
+        .client_name = link->program->name,
         .client_version = GN_VERSION,
+        .want_lighting_states = link->wants_light,
+        .timeout_ms = link->timeout_ms,
     };
     struct gn_wire_fault why = {{0}};
     int err = gn_client_connect(&client_options, out_client, &why);
@@ -74,12 +77,19 @@ int gn_cmd_connect(const struct gn_program *program, const struct gn_options *op
         return gn_error_set(out_error, err, "%s%s", why.text, get_hint(err));
     if (err)
         return gn_error_set(out_error, err, "%s: %s%s", text, why.text, get_hint(err));
-    err = gn_client_sync_clock(*out_client, 8, 5000);
+    err = gn_client_sync_clock(*out_client, 8, link->timeout_ms > 0 ? link->timeout_ms : 5000);
     if (err) {
         gn_cmd_set_fault(*out_client, err, out_error);
         gn_client_destroy(out_client);
     }
     return err;
+}
+
+int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
+                   enum gn_msg_role role, struct gn_client **out_client, struct gn_error *out_error)
+{
+    const struct gn_cmd_link link = {.program = program, .options = options, .role = role};
+    return gn_cmd_connect_as(&link, out_client, out_error);
 }
 
 void gn_cmd_disconnect(struct gn_client **client)

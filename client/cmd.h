@@ -49,6 +49,19 @@ int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
 /** "gnomon COMMAND: sentence" on stderr. Returns 1, the exit status. */
 int gn_cmd_fail(const struct gn_program *program, const char *sentence);
 
+/** A connection as the command line has it. All borrowed. */
+struct gn_cmd_link {
+    const struct gn_program *program;
+    const struct gn_options *options; // --server, --room and --token
+    enum gn_msg_role role;
+    bool wants_light; // LIGHTING_STATE, without maps
+    int timeout_ms;   // of each step, > 0, default 5000
+};
+/** Connects and synchronises the clock. Returns 0, or a negative errno and a sentence.
+ * Thread-safety: safe. */
+GN_MUST_USE int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
+                                  struct gn_error *out_error);
+
 /**
  * Connects as --server, --room and --token say and synchronises the clock. Returns 0, or a negative
  * errno and a sentence.

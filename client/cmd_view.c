@@ -4,25 +4,20 @@
  * gnomon view: streams camera frames and poses from files and cameras, writes what comes back.
  */
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "client/capture/sequence.h"
-#include "client/feed.h"
-#include "client/view/record.h"
+#include "client/viewer.h"
 #include "common/clock.h"
 #include "common/text.h"
 #include "proto/attr.h"
 
-/** How long a frame's answer is waited for; of reference quality, which takes minutes. */
-#define ANSWER_NS (60 * GN_NS_PER_S)
-#define REFERENCE_ANSWER_NS (3600 * GN_NS_PER_S)
 /** How long a frame may wait for light, ms. */
 #define LIGHT_WAIT_MS 5000
-/** Most frames on their way at once. */
-#define MAX_OUTSTANDING 16
+/** Where the composites go for which there is no window. */
+#define DEFAULT_DIR "composites"
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
@@ -39,9 +34,22 @@ static const struct gn_option option_table[] = {
      .flag = "out",
      .type = GN_OPTION_STRING,
      .value_name = "DIR",
-     .is_required = true,
      .help = "Where the composited frames and view.json (every receipt) go; each round of --loop "
-             "replaces the pictures of the one before."},
+             "replaces the pictures of the one before. With --window it may be left out."},
+    {.key = "window",
+     .flag = "window",
+     .type = GN_OPTION_BOOL,
+     .default_value = "false",
+     .help = "Show the composites live; h lists the keys: figures, light, objects and shadows on "
+             "and off, pictures kept, a recording. Without --out and --count files begin again at "
+             "the end, until q. A server that is lost is waited for. Where there is no display "
+             "the composites go to --out, or to " DEFAULT_DIR ", and that is said."},
+    {.key = "show",
+     .flag = "show",
+     .type = GN_OPTION_SET,
+     .choices = "virtual|shadow",
+     .default_value = "all",
+     .help = "What of the virtual objects is in the composites: they themselves, their shadows."},
     {.key = "result",
      .flag = "result",
      .type = GN_OPTION_ENUM,
@@ -74,7 +82,7 @@ static const struct gn_option option_table[] = {
      .flag = "outstanding",
      .type = GN_OPTION_INT,
      .min = 1,
-     .max = MAX_OUTSTANDING,
+     .max = GN_VIEWER_MAX_OUTSTANDING,
      .default_value = "1",
      .help = "Frames that may be on their way at once. With 1 a frame waits for the result of the "
              "one before; with more, frames that the server has not begun are replaced by newer "
@@ -98,42 +106,18 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon view",
-    .usage =
-        "--sequence DIR | {--files PATTERN | --gige ID | --v4l2 DEVICE} --camera FILE, --out DIR "
-        "[OPTION]...",
+    .usage = "--sequence DIR | {--files PATTERN | --gige ID | --v4l2 DEVICE} --camera FILE, "
+             "--out DIR | --window [OPTION]...",
     .summary = "Streams camera frames and poses to a room and writes the composited frames that "
                "come back, with their receipts. Every frame comes back exactly once, as a result "
                "or as dropped with the reason. At the start it waits up to 5 s for light.",
     .notes = "Examples:\n"
              "  gnomon view --sequence .cache/rig/lamps --out composites\n"
              "  gnomon view --files 'shots/*.jpg' --camera camera.json --out composites\n"
-             "  gnomon view --gige any --camera camera.json --out composites\n",
+             "  gnomon view --gige any --camera camera.json --out composites\n"
+             "  gnomon view --files shots --camera camera.json --window\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
-};
-
-/** A frame that has been sent and not answered. id 0: free. */
-struct pending {
-    uint64_t id;
-    int64_t sent_ns;
-    char name[GN_FILE_NAME_BYTES];
-};
-
-/** One run of the command. */
-struct view {
-    struct gn_feed feed;
-    const char *dir; // borrowed from the options
-    struct gn_record *record;
-    struct gn_camera camera;
-    struct gn_msg_frame frame; // what all frames have in common
-    uint64_t sync_light;       // 0: not asked for
-    int64_t first_sent_ns;
-    int max_outstanding;
-    int n_outstanding;
-    struct pending pending[MAX_OUTSTANDING];
-    long n_results, n_dropped;
-    double latency_sum_ms, latency_max_ms;
-    char last_drop[256]; // why a frame was dropped
 };
 
 /** What is wrong with the options together; NULL: nothing. */
@@ -145,6 +129,9 @@ static const char *find_misuse(const struct gn_options *options)
     const char *misuse = gn_feed_find_misuse(options);
     if (misuse)
         return misuse;
+    if (!gn_options_is_set(options, NULL, NULL, "out") &&
+        !gn_options_get_bool(options, NULL, NULL, "window"))
+        return "give --out DIR, for the composites, or --window";
     if (has_dir + has_files + gn_live_count_asked(options) != 1 || has_dir == has_camera)
         return "give --sequence DIR, or --files PATTERN or a camera (--gige ID, --v4l2 DEVICE) "
                "with --camera FILE";
@@ -154,124 +141,8 @@ static const char *find_misuse(const struct gn_options *options)
     return NULL;
 }
 
-static int send_camera(struct view *v)
-{
-    const struct gn_camera *c = &v->camera;
-    struct gn_msg_camera message = {
-        .width = (uint32_t)c->width,
-        .height = (uint32_t)c->height,
-        .fx = c->fx,
-        .fy = c->fy,
-        .cx = c->cx,
-        .cy = c->cy,
-        .k1 = c->distortion[0],
-        .k2 = c->distortion[1],
-        .p1 = c->distortion[2],
-        .p2 = c->distortion[3],
-        .k3 = c->distortion[4],
-        .has_response = true,
-        .scale = c->response.scale,
-        .blur_px = c->match.blur_px,
-    };
-    memcpy(message.noise_slope, c->match.noise_slope, sizeof(message.noise_slope));
-    memcpy(message.noise_offset, c->match.noise_offset, sizeof(message.noise_offset));
-    gn_cmd_make_response(&c->response, &message.response);
-    memcpy(message.matrix_to_rec709, c->response.to_rec709, sizeof(c->response.to_rec709));
-    return gn_client_send_camera(v->feed.client, &message);
-}
-
-static struct pending *find_pending(struct view *v, uint64_t id)
-{
-    for (int i = 0; i < MAX_OUTSTANDING; i++) {
-        if (v->pending[i].id == id)
-            return &v->pending[i];
-    }
-    return NULL;
-}
-
-/** Takes what the server says about one frame. */
-static int take_answer(struct view *v, const struct gn_client_event *event,
-                       struct gn_error *out_error)
-{
-    bool is_result = event->type == GN_WIRE_RESULT;
-    uint64_t id = is_result ? event->message.result.id : event->message.dropped.id;
-    struct pending *p = id ? find_pending(v, id) : NULL;
-    if (!p)
-        return gn_error_set(out_error, -EPROTO, "frame %llu came back though it was not out",
-                            (unsigned long long)id);
-    int err;
-    if (is_result) {
-        double latency_ms = (double)(event->received_ns - p->sent_ns) * 1e-6;
-        const struct gn_msg_receipt *r = &event->message.result.receipt;
-        err = gn_record_add_result(v->record, p->name, &event->message.result, event->payload,
-                                   latency_ms, out_error);
-        v->n_results++;
-        v->latency_sum_ms += latency_ms;
-        v->latency_max_ms = fmax(v->latency_max_ms, latency_ms);
-        printf("frame %llu: %s, %.1f ms, %u lights, light %llu\n", (unsigned long long)id, p->name,
-               latency_ms, r->lights_used, (unsigned long long)r->lighting_sequence);
-    } else {
-        const struct gn_msg_dropped *d = &event->message.dropped;
-        err = gn_record_add_dropped(v->record, p->name, d, out_error);
-        v->n_dropped++;
-        snprintf(v->last_drop, sizeof(v->last_drop), "%s",
-                 d->sentence[0] ? d->sentence : gn_wire_get_drop_text(d->reason));
-        gn_text_clean(v->last_drop);
-        printf("frame %llu: %s, dropped: %s\n", (unsigned long long)id, p->name, v->last_drop);
-    }
-    fflush(stdout);
-    p->id = 0;
-    v->n_outstanding--;
-    return err;
-}
-
-/** Refuses to wait any longer for a frame that is out. */
-static int check_answers(const struct view *v, struct gn_error *out_error)
-{
-    int64_t now_ns = gn_client_now_ns();
-    int64_t limit_ns =
-        v->frame.quality == GN_MSG_QUALITY_REFERENCE ? REFERENCE_ANSWER_NS : ANSWER_NS;
-    for (int i = 0; i < MAX_OUTSTANDING; i++) {
-        const struct pending *p = &v->pending[i];
-        if (p->id && now_ns - p->sent_ns > limit_ns)
-            return gn_error_set(out_error, -ETIMEDOUT, "frame %llu (%s) was not answered in %d s",
-                                (unsigned long long)p->id, p->name, (int)(limit_ns / GN_NS_PER_S));
-    }
-    return 0;
-}
-
-/**
- * Takes events until due_ns and until no more than max_left frames are out. 0, -EINTR (Ctrl-C), or
- * an error and its sentence.
- */
-static int serve(struct view *v, int64_t due_ns, int max_left, struct gn_error *out_error)
-{
-    for (;;) {
-        if (gn_cmd_is_interrupted())
-            return -EINTR;
-        int timeout_ms = gn_feed_get_timeout_ms(due_ns);
-        bool is_due = timeout_ms == 0;
-        if (is_due && v->n_outstanding > max_left)
-            timeout_ms = 200;
-        struct gn_client_event event;
-        int err, got = gn_client_poll(v->feed.client, timeout_ms, &event);
-        if (got < 0)
-            err = gn_cmd_set_fault(v->feed.client, got, out_error);
-        else if (got == 0)
-            err = gn_feed_keep_clock(&v->feed, out_error);
-        else if (event.type == GN_WIRE_RESULT || event.type == GN_WIRE_DROPPED)
-            err = take_answer(v, &event, out_error);
-        else
-            err = gn_cmd_take_event(&event, out_error);
-        if (!err)
-            err = check_answers(v, out_error);
-        if (err || (is_due && got == 0 && v->n_outstanding <= max_left))
-            return err;
-    }
-}
-
 /** What light the frame waits for: that of its number, or, before the first result, any. */
-static void set_light_wanted(struct view *v, struct gn_msg_frame *frame)
+static void set_light_wanted(struct gn_viewer *v, struct gn_msg_frame *frame)
 {
     int64_t now_ns = gn_client_now_ns();
     if (v->feed.n_sent == 0)
@@ -288,8 +159,8 @@ static void set_light_wanted(struct view *v, struct gn_msg_frame *frame)
 static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
                       struct gn_error *out_error)
 {
-    struct view *v = (struct view *)r;
-    int err = serve(v, gn_feed_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
+    struct gn_viewer *v = (struct gn_viewer *)r;
+    int err = gn_viewer_serve(v, gn_feed_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
     if (err)
         return err;
     bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
@@ -301,8 +172,14 @@ static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
         return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
                             capture->name, capture->width, capture->height, v->camera.width,
                             v->camera.height);
-    struct pending *p = find_pending(v, 0);
+    struct gn_viewer_pending *p = gn_viewer_get_free(v);
     struct gn_msg_frame frame = v->frame;
+    const struct gn_pose *pose =
+        capture->has_pose ? &capture->world_from_camera : &v->camera.world_from_camera;
+    if (v->show) {
+        gn_show_set_wishes(v->show, &frame);
+        gn_show_put_pose(v->show, pose);
+    }
     frame.id = (uint64_t)r->n_sent + 1;
     frame.capture_time_ns = gn_feed_get_capture_ns(r, capture);
     frame.views_count = 1;
@@ -311,33 +188,35 @@ static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
         .picture_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
         .payload_length = (uint32_t)capture->data_bytes,
     };
-    gn_cmd_make_transform(capture->has_pose ? &capture->world_from_camera
-                                            : &v->camera.world_from_camera,
-                          &frame.views[0].world_from_camera);
+    gn_cmd_make_transform(pose, &frame.views[0].world_from_camera);
     set_light_wanted(v, &frame);
-    *p = (struct pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
+    *p = (struct gn_viewer_pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
     err = gn_client_send_frame(r->client, &frame, capture->data, capture->data_bytes);
-    if (err)
-        return gn_cmd_set_fault(r->client, err, out_error);
+    if (err) {
+        bool is_ours = err == -EDOM || err == -EMSGSIZE;
+        gn_cmd_set_fault(r->client, err, out_error);
+        if (is_ours || !v->show)
+            return err;
+    }
     r->n_sent++;
     v->n_outstanding++;
-    return 0;
+    return err ? gn_viewer_reconnect(v, err, out_error) : 0;
 }
 
 /** So that the picture that is read then is the newest when it is sent. */
 static int wait_for_room(struct gn_feed *r, struct gn_error *out_error)
 {
-    struct view *v = (struct view *)r;
-    return serve(v, 0, v->max_outstanding - 1, out_error);
+    struct gn_viewer *v = (struct gn_viewer *)r;
+    return gn_viewer_serve(v, 0, v->max_outstanding - 1, out_error);
 }
 
 static int wait_for_answers(struct gn_feed *r, struct gn_error *out_error)
 {
-    return serve((struct view *)r, 0, 0, out_error);
+    return gn_viewer_serve((struct gn_viewer *)r, 0, 0, out_error);
 }
 
-static void set_frame_options(struct view *v, const struct gn_options *options)
+static void set_frame_options(struct gn_viewer *v, const struct gn_options *options)
 {
     bool is_jpeg = gn_options_get_enum(options, NULL, NULL, "result") == 1;
     v->frame.result_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8;
@@ -350,12 +229,37 @@ static void set_frame_options(struct view *v, const struct gn_options *options)
     v->max_outstanding = gn_options_get_int(options, NULL, NULL, "outstanding");
     if (gn_options_is_set(options, NULL, NULL, "sync-light"))
         v->sync_light = (uint64_t)gn_options_get_int(options, NULL, NULL, "sync-light");
+    unsigned shown = gn_options_get_set(options, NULL, NULL, "show");
+    v->frame.no_virtual = !(shown & 1);
+    v->frame.no_shadow = !(shown & 2);
+}
+
+/** Where there is no display, files take the window's place. */
+static int open_window(struct gn_viewer *v, const struct gn_options *options,
+                       struct gn_error *out_error)
+{
+    if (!gn_options_get_bool(options, NULL, NULL, "window"))
+        return 0;
+    const struct gn_show_options show_options = {.width = v->camera.width,
+                                                 .height = v->camera.height,
+                                                 .dir = v->dir,
+                                                 .no_virtual = v->frame.no_virtual,
+                                                 .no_shadow = v->frame.no_shadow};
+    int err = gn_show_open(&show_options, &v->show, out_error);
+    v->feed.link.wants_light = !err;
+    if (err != -ENODEV)
+        return err;
+    v->dir = v->dir ? v->dir : DEFAULT_DIR;
+    fprintf(stderr, "%s: %s; the composites go to %s instead\n", program.name, out_error->text,
+            v->dir);
+    *out_error = (struct gn_error){0};
+    return 0;
 }
 
 static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
-    struct view *v = (struct view *)r;
+    struct gn_viewer *v = (struct gn_viewer *)r;
     const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
     const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
     const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
@@ -377,6 +281,12 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
     gn_sequence_finish(&sequence);
     v->dir = gn_options_get_string(options, NULL, NULL, "out");
     set_frame_options(v, options);
+    if (!err)
+        err = open_window(v, options, out_error);
+    // What is only looked at goes on until somebody has seen enough.
+    bool is_loop_said = strcmp(gn_options_get_source(options, NULL, NULL, "loop"), "default") != 0;
+    if (v->show && !v->dir && !r->n_wanted && !is_loop_said)
+        r->is_looped = true;
     const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
     const struct gn_live_options wanted = {
         .is_8_bit = true, .width = v->camera.width, .height = v->camera.height};
@@ -392,17 +302,25 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
 
 static int begin(struct gn_feed *r, struct gn_error *out_error)
 {
-    struct view *v = (struct view *)r;
-    int err = send_camera(v);
-    return err ? gn_cmd_set_fault(r->client, err, out_error)
-               : gn_record_open(v->dir, &v->record, out_error);
+    struct gn_viewer *v = (struct gn_viewer *)r;
+    int err = gn_viewer_send_camera(v, out_error);
+    if (!err && v->show) {
+        char title[256];
+        snprintf(title, sizeof(title), "gnomon: room %s - h lists the keys",
+                 gn_client_get_welcome(r->client)->room);
+        gn_text_clean(title);
+        gn_show_set_title(v->show, title);
+    }
+    return err || !v->dir ? err : gn_record_open(v->dir, &v->record, out_error);
 }
 
 static int report(struct gn_feed *r, int err, const struct gn_error *error)
 {
-    struct view *v = (struct view *)r;
+    struct gn_viewer *v = (struct gn_viewer *)r;
     struct gn_error drop_error = {0}, record_error = {0};
-    if (!err && v->n_results == 0 && v->n_dropped > 0) {
+    gn_show_close(&v->show);
+    err = v->is_closed ? 0 : err;
+    if (!err && !v->is_closed && v->n_results == 0 && v->n_dropped > 0) {
         err = gn_error_set(&drop_error, -ENODATA, "no frame was rendered: %s", v->last_drop);
         error = &drop_error;
     }
@@ -417,7 +335,12 @@ static int report(struct gn_feed *r, int err, const struct gn_error *error)
         printf("; %.1f ms from sending to result (mean), %.1f at most",
                v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
     gn_feed_print_shift(r);
-    printf("; in %s\n", v->dir);
+    if (v->n_reconnected > 0)
+        printf("; connected again %d time%s, %ld frames lost", v->n_reconnected,
+               v->n_reconnected == 1 ? "" : "s", v->n_lost);
+    if (v->dir)
+        printf("; in %s", v->dir);
+    printf("\n");
     return err || record_err ? 1 : 0;
 }
 
@@ -435,6 +358,8 @@ int gn_cmd_view(int argc, char *const argv[])
         .end = wait_for_answers,
         .report = report,
     };
-    struct view v = {0};
-    return gn_feed_run(&command, &v.feed, argc, argv);
+    struct gn_viewer v = {0};
+    int status = gn_feed_run(&command, &v.feed, argc, argv);
+    gn_show_close(&v.show); // where it never came to a report
+    return status;
 }

@@ -203,13 +203,15 @@ int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int ar
     const char *misuse = command->find_misuse(options);
     int status = 1;
     r->program = command->program;
+    r->link = (struct gn_cmd_link){
+        .program = command->program, .options = options, .role = command->role};
     read_pace(r, options,
               command->takes_sequences && gn_options_is_set(options, NULL, NULL, "sequence"));
     if (misuse) {
         gn_cmd_fail(command->program, misuse);
         status = 2;
     } else if (command->open(r, options, &error) < 0 ||
-               gn_cmd_connect(command->program, options, command->role, &r->client, &error) < 0 ||
+               gn_cmd_connect_as(&r->link, &r->client, &error) < 0 ||
                (command->begin && command->begin(r, &error) < 0)) {
         gn_cmd_fail(command->program, error.text);
     } else {

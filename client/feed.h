@@ -63,6 +63,7 @@
 /** One run of a command; each command's own state begins with it. */
 struct gn_feed {
     const struct gn_program *program;
+    struct gn_cmd_link link;  // how to connect; what it says beside role is open's to change
     struct gn_client *client; // owned; NULL until connected
     struct gn_source *source; // owned
     bool is_looped;
