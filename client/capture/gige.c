@@ -25,7 +25,7 @@
 #include "common/thread.h"
 
 /** How long a camera that another client holds is waited for: its heartbeat time, 3 s, and more. */
-#define PATIENCE_MS 5000
+#define PATIENCE_MS 4000
 /** How long the thread waits in one call: for a picture, or for a sign of life. */
 #define TICK_US 50000
 /** A camera that was just started may take so long for its first picture. */

@@ -1,0 +1,318 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""GigE Vision cameras on loopback: Aravis' own fake and one of ours, read by the client's source
+and by gnomon probe and view, against a real gnomond.
+
+usage: gige.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON FAKE_GIGE GIGE_TOOL
+"""
+import fcntl
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+
+def enter_network():
+    """Runs this script again in a network of its own, where nobody else has cameras."""
+    for how in (['unshare', '--net'], ['unshare', '--user', '--map-root-user', '--net']):
+        if subprocess.run(how + ['true'], stderr=subprocess.DEVNULL).returncode == 0:
+            os.environ['GN_OWN_NETWORK'] = '1'
+            os.execvp(how[0], how + [sys.executable] + sys.argv)
+    print('1..0 # SKIP no network namespace may be made here (unshare --net)')
+    sys.exit(0)
+
+
+if 'GN_OWN_NETWORK' not in os.environ:
+    enter_network()
+SIOCSIFFLAGS, IFF_UP, IFF_RUNNING = 0x8914, 0x1, 0x40
+with socket.socket() as loopback:
+    fcntl.ioctl(loopback, SIOCSIFFLAGS, struct.pack('16sH14x', b'lo', IFF_UP | IFF_RUNNING))
+
+sys.path.insert(0, sys.argv[2])
+from gnomond import Daemon, run_tests  # noqa: E402
+from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
+
+GNOMON, FAKE, TOOL = sys.argv[3:6]
+WIDTH, HEIGHT = 128, 96
+SETUP = {'projection': 'fisheye-equidistant', 'response': {'type': 'log', 'a': 0.6, 'b': 0.045,
+                                                           'c': 0.0001}}
+CAMERA = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH / 2, 'fy': WIDTH / 2, 'cx': WIDTH / 2,
+          'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],
+          'world_from_camera': [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 2, 0, 0, 0, 1]}
+
+
+class Camera:
+    """A running camera, found at 127.0.0.1."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen([FAKE, *arguments], stdout=subprocess.PIPE, text=True)
+        self.ready_s = None
+        assert self.process.stdout.readline() == 'ready\n', 'the camera does not start'
+        self.ready_s = time.monotonic()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait()
+            self.process.stdout.close()
+
+
+class Program:
+    """A running program whose lines are read as they come."""
+
+    def __init__(self, *command):
+        self.err = tempfile.TemporaryFile('w+')
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.err, text=True)
+
+    def wait_for(self, pattern, timeout=30):
+        """Reads on until a line has the pattern."""
+        deadline = time.monotonic() + timeout
+        for line in self.process.stdout:
+            if re.search(pattern, line):
+                return line
+            assert time.monotonic() < deadline, 'never said %r' % pattern
+        raise AssertionError('ended without %r: %s' % (pattern, self.read_err()))
+
+    def read_err(self):
+        return os.pread(self.err.fileno(), 1 << 20, 0).decode()
+
+    def interrupt(self):
+        """As Ctrl-C; it must end well. Returns what it still said."""
+        self.process.send_signal(signal.SIGINT)
+        return self.end()
+
+    def end(self, status=0, timeout=60):
+        out, _ = self.process.communicate(timeout=timeout)
+        err = self.read_err()
+        self.err.close()
+        assert self.process.returncode == status, (self.process.returncode, out[-2000:], err)
+        return out, err
+
+
+class Folder:
+    def __init__(self):
+        self.path = tempfile.mkdtemp(prefix='gnomon-gige-test.')
+        self.write('setup.json', json.dumps(SETUP).encode())
+        self.write('camera.json', json.dumps(CAMERA).encode())
+
+    def at(self, name):
+        return os.path.join(self.path, name)
+
+    def write(self, name, data):
+        with open(self.at(name), 'wb') as out:
+            out.write(data)
+        return self.at(name)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        shutil.rmtree(self.path)
+
+
+def size(width=WIDTH, height=HEIGHT):
+    return ['--width', str(width), '--height', str(height)]
+
+
+def read_pictures(who, name, n, depth='deep', width=WIDTH, height=HEIGHT, rate=100, before=()):
+    """n pictures held to the pattern, to the bit."""
+    done = subprocess.run([*before, TOOL, who, name, str(width), str(height), str(rate), str(n),
+                           depth], stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=90,
+                          text=True)
+    assert done.returncode == 0, (name, done.stdout[-500:], done.stderr)
+    got = json.loads(done.stdout.splitlines()[-1])
+    assert got['pictures'] == n and got['wrong'] == 0, (name, got, done.stderr)
+    # Taken before they were read, and not long before.
+    assert 0 <= got['age_ms'][0] and got['age_ms'][2] < 3000, got
+    return got
+
+
+def server(daemon):
+    return '--server=%s:%d' % daemon.address
+
+
+def probe(daemon, folder, *more, who='127.0.0.1'):
+    return Program(GNOMON, 'probe', server(daemon), '--gige', who, '--setup',
+                   folder.at('setup.json'), *more)
+
+
+def test_formats():
+    """Every way of packing, from our camera, to the bit, with at most one copy."""
+    with Camera(*size()):
+        for name, depth, copies in (
+                ('Mono8', 'deep', 1), ('Mono10', 'deep', 1), ('Mono10p', 'deep', 1),
+                ('Mono10Packed', 'deep', 1), ('Mono12', 'deep', 0), ('Mono12p', 'deep', 1),
+                ('Mono12Packed', 'deep', 1), ('Mono12', '8', 1), ('Mono14', 'deep', 1),
+                ('Mono16', 'deep', 0), ('BayerRG8', '8', 1), ('BayerRG12p', 'deep', 1),
+                ('RGB8', '8', 0), ('BGR8', '8', 1), ('RGB12', 'deep', 0)):
+            got = read_pictures('127.0.0.1', name, 3, depth)
+            assert got['copies'] == copies, (name, got)
+
+
+def test_stock():
+    """Aravis' own camera, found by search; gnomon doctor lists it."""
+    with Camera('--stock', '--serial', 'ST7'), Daemon() as daemon:
+        for who, name in (('any', 'Mono12'), ('ST7', 'RGB8')):
+            read_pictures(who, name, 3)
+        out, _ = Program(GNOMON, 'doctor', server(daemon)).end()
+        assert re.search(r'^ok +GigE +Aravis-Fake-ST7: .*at 127\.0\.0\.1$', out, re.M), out
+        out, err = Program(GNOMON, 'probe', server(daemon), '--gige', 'ST8').end(1)
+        assert 'no such camera; there are: Aravis-Fake-ST7' in err and err.count('\n') == 1, err
+
+
+def read_number(path):
+    with open(path) as f:
+        return int(f.read())
+
+
+def test_ordinary_user():
+    """Without the right to raw sockets: the socket's buffer must hold a picture's packets."""
+    drop = ['setpriv', '--bounding-set', '-all', '--inh-caps', '-all']
+    nobody = drop + ['--reuid', '65534', '--regid', '65534', '--clear-groups']
+    if subprocess.run(nobody + ['test', '-x', TOOL], stderr=subprocess.DEVNULL).returncode == 0:
+        drop = nobody
+    with Camera(*size(640, 480)):
+        got = read_pictures('127.0.0.1', 'Mono12', 30, width=640, height=480, rate=30, before=drop)
+    if read_number('/proc/sys/net/core/rmem_max') >= 1 << 20:
+        # With the buffer that sockets have by themselves three of four are incomplete.
+        assert got['incomplete'] <= 6, got
+
+
+def test_loss():
+    """What is lost is asked for again; where it never comes the picture is counted, not sent."""
+    with Camera(*size(640, 480), '--loss', '0.01'):
+        got = read_pictures('127.0.0.1', 'Mono12p', 30, width=640, height=480, rate=30)
+    assert got['resent'] > 30 and got['complete'] > got['incomplete'], got
+    with Camera(*size(640, 480), '--loss', '0.002', '--no-resend'):
+        got = read_pictures('127.0.0.1', 'Mono12', 10, width=640, height=480, rate=30)
+    assert got['incomplete'] > 0 and got['lost_packets'] > 0 and got['resent'] == 0, got
+
+
+def test_restart():
+    """The camera is killed and comes back: pictures within 2 s, and nobody else notices."""
+    with Daemon() as daemon, Folder() as folder:
+        camera = Camera(*size())
+        lamp = probe(daemon, folder, '--frame-rate', '25')
+        lamp.wait_for('environment frame 5:')
+        os.mkdir(folder.at('shots'))
+        folder.write('shots/a.png', png_bytes(WIDTH, HEIGHT, bytes(3 * WIDTH * HEIGHT)))
+        viewer = Program(GNOMON, 'view', server(daemon), '--files', folder.at('shots'), '--camera',
+                         folder.at('camera.json'), '--out', folder.at('out'), '--loop', '--rate',
+                         '10')
+        viewer.wait_for('^frame 3:')
+        camera.kill()
+        time.sleep(1)
+        while 'lost' not in lamp.read_err():
+            time.sleep(0.02)
+        viewer.wait_for('^frame 10:')
+        with Camera(*size()) as camera:
+            # All that was printed before is read; the next line is of a picture that came now.
+            os.set_blocking(lamp.process.stdout.fileno(), False)
+            while lamp.process.stdout.readline():
+                pass
+            os.set_blocking(lamp.process.stdout.fileno(), True)
+            lamp.wait_for('environment frame')
+            gap_s = time.monotonic() - camera.ready_s
+            assert gap_s < 2, 'pictures came %.2f s after the camera' % gap_s
+            lamp.wait_for('environment frame')
+            out, err = lamp.interrupt()
+        assert 'opened again 1 times' in out, out
+        lines = err.splitlines()
+        assert len(lines) == 2 and 'lost' in lines[0] and lines[1].endswith('back'), err
+        _, err = viewer.interrupt()
+        assert err == '', err
+        with open(folder.at('out/view.json')) as f:
+            report = json.load(f)
+        assert report['dropped'] == 0 and report['results'] >= 10 and daemon.is_alive()
+
+
+def test_view():
+    """A camera's pictures as camera frames: composites of the camera's pixels."""
+    with Daemon() as daemon, Folder() as folder:
+        folder.write('a.png', png_bytes(WIDTH, HEIGHT, bytes([16, 160, 80]) * WIDTH * HEIGHT))
+        subprocess.run([GNOMON, 'probe', server(daemon), '--files',
+                        folder.write('light.exr', exr_bytes(32, 16, (1, 1, 1)))], check=True,
+                       stdout=subprocess.DEVNULL)
+        with Camera(*size(), '--files', folder.at('*.png')):
+            out, _ = Program(GNOMON, 'view', server(daemon), '--gige', '127.0.0.1', '--camera',
+                             folder.at('camera.json'), '--out', folder.at('out'),
+                             '--pixel-format', 'BayerRG12p', '--frame-rate', '25', '--count',
+                             '8').end()
+        assert '8 frames sent, 8 results' in out and 'camera: ' in out, out
+        with open(folder.at('out/view.json')) as f:
+            report = json.load(f)
+        capture = report['capture']
+        assert capture['read'] >= 8 and capture['copied_bytes'] == capture['read_bytes'], capture
+        assert capture['read_bytes'] == capture['read'] * 3 * WIDTH * HEIGHT, capture
+        width, height, data = read_png(folder.at('out/000001.png'))
+        assert (width, height) == (WIDTH, HEIGHT)
+        assert data[:3] == bytes([16, 160, 80]), data[:3]  # beyond the floor: as it came
+
+
+def test_controller():
+    """A dead client's hold is waited for; a living one's is told."""
+    with Camera(*size()):
+        first = Program(TOOL, '127.0.0.1', 'Mono12', str(WIDTH), str(HEIGHT), '50', '1000000',
+                        'deep')
+        first.wait_for('^5 ')
+        done = subprocess.run([TOOL, '127.0.0.1', 'Mono12', '0', '0', '0', '1', 'deep'],
+                              stderr=subprocess.PIPE, text=True, timeout=60)
+        assert done.returncode == 1 and 'another program controls it' in done.stderr, done
+        first.process.kill()
+        first.process.wait()
+        first.process.stdout.close()
+        read_pictures('127.0.0.1', 'Mono12', 3)
+
+
+def test_hostile():
+    """Cameras that lie: no picture of theirs is given out; the daemon sees nothing of it."""
+    with Daemon() as daemon, Folder() as folder:
+        for fault in ('size', 'format', 'truncated'):
+            with Camera(*size(), '--fault', fault):
+                lamp = probe(daemon, folder, '--frame-rate', '50')
+                time.sleep(0.7)
+                out, _ = lamp.interrupt()
+                count = re.search(r'camera: 0 whole pictures, (\d+) incomplete', out)
+                assert count and int(count.group(1)) > 3, (fault, out)
+                assert '0 environment frames sent' in out, out
+        for fault, word in (('codes', 'codes above those of Mono12'), ('huge', 'cannot')):
+            with Camera(*size(), '--fault', fault):
+                _, err = probe(daemon, folder, '--pixel-format', 'Mono12').end(1)
+                assert word in err and err.count('\n') == 1, (fault, err)
+        assert daemon.is_alive()
+
+
+def test_settings():
+    """What a camera cannot do is refused by name; without a camera it is said."""
+    with Daemon() as daemon, Folder() as folder:
+        with Camera(*size()):
+            for option, value, words in (('--pixel-format', 'Fancy', ['--pixel-format', 'Fancy']),
+                                         ('--frame-size', '9000x9000', ['9000x9000'])):
+                _, err = probe(daemon, folder, option, value).end(1)
+                assert err.count('\n') == 1 and all(word in err for word in words), err
+            out, _ = probe(daemon, folder, '--frame-size', '64x48', '--exposure-us', '5000',
+                           '--gain', '2', '--frame-rate', '50', '--count', '3').end()
+            assert '64x48' in out and '3 environment frames sent' in out, out
+        _, err = probe(daemon, folder).end(1)
+        assert 'no GigE Vision camera answers at this address' in err, err
+        _, err = probe(daemon, folder, who='any').end(1)
+        assert 'no GigE Vision camera answers in the networks' in err, err
+
+
+run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_restart, test_view,
+           test_controller, test_hostile, test_settings])
