@@ -15,6 +15,7 @@
 #include "common/options.h"
 
 /** argv[0] is the command's name. Each returns the process's exit status. */
+int gn_cmd_calibrate(int argc, char *const argv[]);
 int gn_cmd_probe(int argc, char *const argv[]);
 int gn_cmd_screen(int argc, char *const argv[]);
 int gn_cmd_track(int argc, char *const argv[]);

@@ -94,6 +94,8 @@ static void make_frame(const struct gn_probe_setup *setup, struct gn_msg_environ
     make_projection(&setup->projection, &out->projection);
     out->has_response = true;
     gn_cmd_make_response(&setup->response, &out->response);
+    if (setup->response.type == GN_RESPONSE_TABLE)
+        out->response.table_entries = (uint32_t)setup->response.table_size;
     memcpy(out->matrix_to_rec709, setup->response.to_rec709, sizeof(setup->response.to_rec709));
     out->scale = setup->response.scale;
     out->has_world_from_probe = true;
@@ -160,6 +162,23 @@ static int check_capture(const struct gn_probe_setup *setup, const struct gn_cap
     return 0;
 }
 
+/** Memory that grows to the largest picture. */
+struct buffer {
+    uint8_t *data; // owned
+    size_t n_bytes;
+};
+
+static bool reserve(struct buffer *buffer, size_t n_bytes)
+{
+    if (n_bytes <= buffer->n_bytes)
+        return true;
+    uint8_t *data = realloc(buffer->data, n_bytes);
+    if (!data)
+        return false;
+    *buffer = (struct buffer){data, n_bytes};
+    return true;
+}
+
 /** One run of the command. */
 struct probe {
     struct gn_feed feed;
@@ -168,6 +187,8 @@ struct probe {
     uint64_t first_sequence;
     struct gn_halves halves;
     bool has_told_halves;
+    struct buffer masked;  // a picture, its masks filled
+    struct buffer payload; // the response's table and a picture
 };
 
 /** Pixels of one picture as they are sent. */
@@ -203,6 +224,46 @@ static int get_pixels(struct probe *p, const struct gn_capture *capture, struct 
                capture->name, scale, scale * 0x1p-14, scale * 0x1p-25);
     }
     *out = (struct pixels){GN_MSG_PIXEL_FORMAT_RGB_F16, scale, p->halves.data, 2 * n};
+    return 0;
+}
+
+/** Copies the picture and fills the setup's masks. *capture then shows the copy. */
+static int fill_masks(struct probe *p, struct gn_capture *capture, struct gn_error *out_error)
+{
+    const struct gn_probe_setup *setup = &p->setup;
+    bool is_mono = capture->format == GN_CAPTURE_MONO12 || capture->format == GN_CAPTURE_MONO16;
+    if (setup->n_masks == 0)
+        return 0;
+    if (capture->format == GN_CAPTURE_JPEG)
+        return gn_error_set(out_error, -EINVAL,
+                            "%s: a mask needs pixels, and this is a JPEG; let the camera send "
+                            "uncompressed pictures, or leave out \"mask\"",
+                            capture->name);
+    if (!reserve(&p->masked, capture->data_bytes))
+        return gn_error_set(out_error, -ENOMEM, "%s: out of memory", capture->name);
+    memcpy(p->masked.data, capture->data, capture->data_bytes);
+    capture->data = p->masked.data;
+    gn_probe_mask_fill(setup->masks, setup->n_masks, p->masked.data, capture->width,
+                       capture->height, is_mono ? 1 : 3,
+                       capture->format == GN_CAPTURE_RGB_F32 ? GN_PROBE_MASK_F32
+                       : capture->format == GN_CAPTURE_RGB8  ? GN_PROBE_MASK_U8
+                                                             : GN_PROBE_MASK_U16);
+    return 0;
+}
+
+/** Puts the response's table, if it has one, before the pixels, as the wire wants it. */
+static int add_table(struct probe *p, struct pixels *pixels, struct gn_error *out_error)
+{
+    const struct gn_response *r = &p->setup.response;
+    size_t n = r->type == GN_RESPONSE_TABLE ? sizeof(float) * (size_t)r->table_size : 0;
+    if (n == 0)
+        return 0;
+    if (!reserve(&p->payload, n + pixels->n_bytes))
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    memcpy(p->payload.data, r->table, n);
+    memcpy(p->payload.data + n, pixels->data, pixels->n_bytes);
+    pixels->data = p->payload.data;
+    pixels->n_bytes += n;
     return 0;
 }
 
@@ -254,11 +315,16 @@ static int send_capture(struct gn_feed *r, const struct gn_capture *capture,
 {
     struct probe *p = (struct probe *)r;
     struct pixels pixels;
+    struct gn_capture shown = *capture;
     int err = check_capture(&p->setup, capture, out_error);
     if (!err)
         err = gn_feed_wait(r, capture, out_error);
     if (!err)
-        err = get_pixels(p, capture, &pixels, out_error);
+        err = fill_masks(p, &shown, out_error);
+    if (!err)
+        err = get_pixels(p, &shown, &pixels, out_error);
+    if (!err)
+        err = add_table(p, &pixels, out_error);
     if (err)
         return err;
     double setup_scale = p->setup.response.scale == 0 ? 1 : p->setup.response.scale;
@@ -302,5 +368,7 @@ int gn_cmd_probe(int argc, char *const argv[])
     struct probe p = {0};
     int status = gn_feed_run(&command, &p.feed, argc, argv);
     gn_halves_finish(&p.halves);
+    free(p.masked.data);
+    free(p.payload.data);
     return status;
 }

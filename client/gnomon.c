@@ -19,6 +19,7 @@ static const struct {
     {"screen", gn_cmd_screen, "stream pictures onto a screen of the scene: near light"},
     {"track", gn_cmd_track, "stream poses of an object of the scene: it moves"},
     {"view", gn_cmd_view, "stream camera frames and poses, write the composited frames"},
+    {"calibrate", gn_cmd_calibrate, "measure a camera or a probe from pictures"},
     {"doctor", gn_cmd_doctor, "say what on this machine works"},
 };
 
@@ -26,7 +27,7 @@ static void print_help(FILE *out)
 {
     fprintf(out, "usage: gnomon COMMAND [OPTION]...\n\nThe clients of gnomond:\n");
     for (size_t i = 0; i < GN_ARRAY_LEN(commands); i++)
-        fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].summary);
+        fprintf(out, "  %-9s %s\n", commands[i].name, commands[i].summary);
     fprintf(out, "\n`gnomon COMMAND --help` tells more. A first try: deploy/quickstart.\n");
 }
 

@@ -4,18 +4,82 @@
 
 #include <errno.h>
 #include <float.h>
+#include <pthread.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/image.h"
+
+/*
+ * Keeps a table for the rest of the process: responses are values that are copied at will and only
+ * borrow it. The same numbers are kept once, so that reading a file again costs nothing.
+ */
+static int keep_table(const struct gn_json *object, float *table, int n,
+                      struct gn_response *out_response, struct gn_error *out_error)
+{
+    static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+    static struct {
+        float *values;
+        int n;
+    } kept[GN_RESPONSE_JSON_TABLES]; // guarded by mutex; what the values say never changes
+    int i = 0, err = 0;
+    pthread_mutex_lock(&mutex);
+    while (i < GN_RESPONSE_JSON_TABLES && kept[i].values &&
+           !(kept[i].n == n && memcmp(kept[i].values, table, (size_t)n * sizeof(*table)) == 0))
+        i++;
+    if (i == GN_RESPONSE_JSON_TABLES) {
+        err = -E2BIG;
+    } else if (!kept[i].values) {
+        kept[i].values = table;
+        kept[i].n = n;
+        table = NULL;
+    }
+    if (!err) {
+        out_response->table = kept[i].values;
+        out_response->table_size = n;
+    }
+    pthread_mutex_unlock(&mutex);
+    free(table);
+    return err ? gn_error_set(out_error, err, "%s: more than %d different response tables",
+                              object->file, GN_RESPONSE_JSON_TABLES)
+               : 0;
+}
+
+static int read_table(const struct gn_json *object, struct gn_response *out,
+                      struct gn_error *out_error)
+{
+    struct gn_json array;
+    int ret = gn_json_get_array(object, "table", 2, 4096, &array, out_error);
+    if (ret < 0)
+        return ret;
+    size_t n = json_array_size(array.value);
+    double *numbers = malloc(n * sizeof(*numbers));
+    float *table = malloc(n * sizeof(*table));
+    if (!numbers || !table)
+        ret = gn_error_set(out_error, -ENOMEM, "%s: out of memory", object->file);
+    if (ret == 0)
+        ret = gn_json_get_numbers(object, "table", n, numbers, out_error);
+    struct gn_response tried = {.type = GN_RESPONSE_TABLE, .table = table, .table_size = (int)n};
+    const char *reason = NULL;
+    for (size_t i = 0; ret == 0 && i < n; i++)
+        table[i] = (float)numbers[i];
+    if (ret == 0 && gn_response_check(&tried, &reason) < 0)
+        ret = gn_json_refuse(object, "table", out_error, "%s", reason);
+    free(numbers);
+    if (ret == 0)
+        return keep_table(object, table, (int)n, out, out_error);
+    free(table);
+    return ret;
+}
 
 static int read_curve(const struct gn_json *root, struct gn_response *out,
                       struct gn_error *out_error)
 {
     /* The types that a file can describe; their order is the enum's. */
-    static const char *const types[] = {"linear", "srgb", "gamma", "log"};
+    static const char *const types[] = {"linear", "srgb", "gamma", "log", "table"};
     static const char *const keys[][4] = {
-        {"type"}, {"type"}, {"type", "gamma"}, {"type", "a", "b", "c"}};
-    static const size_t n_keys[] = {1, 1, 2, 4};
+        {"type"}, {"type"}, {"type", "gamma"}, {"type", "a", "b", "c"}, {"type", "table"}};
+    static const size_t n_keys[] = {1, 1, 2, 4, 2};
     struct gn_json object;
     int type = 0;
     int ret = gn_json_get_object(root, "response", &object, out_error);
@@ -27,6 +91,8 @@ static int read_curve(const struct gn_json *root, struct gn_response *out,
     ret = gn_json_check_keys(&object, keys[type], n_keys[type], out_error);
     if (ret == 0 && out->type == GN_RESPONSE_GAMMA)
         ret = gn_json_get_double(&object, "gamma", 0.1, 10.0, &out->gamma, out_error);
+    if (ret == 0 && out->type == GN_RESPONSE_TABLE)
+        ret = read_table(&object, out, out_error);
     if (ret < 0 || out->type != GN_RESPONSE_LOG)
         return ret;
     ret = gn_json_get_double(&object, "a", -1e6, 1e6, &out->log_a, out_error);
@@ -191,6 +257,28 @@ static int read_projection(const struct gn_json *object, struct gn_projection *o
     return ret;
 }
 
+static int read_masks(const struct gn_json *object, struct gn_probe_setup *out,
+                      struct gn_error *out_error)
+{
+    static const char *const keys[] = {"center", "radius"};
+    struct gn_json array;
+    int ret = gn_json_get_array(object, "mask", 0, GN_PROBE_MASK_MAX, &array, out_error);
+    int n = ret == 0 ? (int)json_array_size(array.value) : 0;
+    for (int i = 0; ret == 0 && i < n; i++) {
+        struct gn_json item;
+        ret = gn_json_get_item(&array, (size_t)i, &item, out_error);
+        if (ret == 0)
+            ret = gn_json_check_keys(&item, keys, GN_ARRAY_LEN(keys), out_error);
+        if (ret == 0)
+            ret = gn_json_get_numbers(&item, "center", 2, out->masks[i].center, out_error);
+        if (ret == 0)
+            ret = gn_json_get_double(&item, "radius", 1e-3, GN_IMAGE_MAX_SIDE,
+                                     &out->masks[i].radius, out_error);
+    }
+    out->n_masks = n;
+    return ret;
+}
+
 static int read_place(const struct gn_json *object, struct gn_pose *out, struct gn_error *out_error)
 {
     int ret = 0;
@@ -207,9 +295,10 @@ static int read_place(const struct gn_json *object, struct gn_pose *out, struct 
 int gn_probe_setup_read_json(const struct gn_json *object, struct gn_probe_setup *out_setup,
                              struct gn_error *out_error)
 {
-    static const char *const keys[] = {
-        "projection", "width",        "height",   "center",    "radius", "theta_max",   "k",
-        "vignetting", "pixel_format", "response", "to_rec709", "scale",  "orientation", "position"};
+    static const char *const keys[] = {"projection",   "width",     "height",    "center",
+                                       "radius",       "theta_max", "k",         "vignetting",
+                                       "pixel_format", "response",  "to_rec709", "scale",
+                                       "orientation",  "position",  "mask"};
     static const char *const formats[] = {"float32", "log12", "linear16"};
     struct gn_probe_setup setup;
     gn_probe_setup_init(&setup);
@@ -226,6 +315,8 @@ int gn_probe_setup_read_json(const struct gn_json *object, struct gn_probe_setup
         ret = gn_response_read_json(object, &setup.response, out_error);
     if (ret == 0)
         ret = read_place(object, &setup.world_from_probe, out_error);
+    if (ret == 0 && gn_json_has(object, "mask"))
+        ret = read_masks(object, &setup, out_error);
     if (ret == 0)
         *out_setup = setup;
     return ret;

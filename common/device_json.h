@@ -12,6 +12,7 @@
 #include "common/camera.h"
 #include "common/error.h"
 #include "common/json.h"
+#include "common/probe_mask.h"
 #include "common/projection.h"
 #include "common/response.h"
 #include "proto/attr.h"
@@ -23,6 +24,8 @@ struct gn_probe_setup {
     bool has_response; // said, not just the default (linear): codes need one
     struct gn_pose world_from_probe;
     bool is_12_bit; // 16-bit files hold codes [0, 4095]
+    int n_masks;    // of masks, to be filled with gn_probe_mask_fill
+    struct gn_probe_mask masks[GN_PROBE_MASK_MAX];
 };
 
 /** A lat-long map of linear radiance in the world's axes, at the marker. */
@@ -31,7 +34,7 @@ void gn_probe_setup_init(struct gn_probe_setup *setup);
 /**
  * Reads a probe's setup: projection (needed), width, height, center, radius, theta_max, k,
  * vignetting, pixel_format ("float32", "log12", "linear16"), response, to_rec709, scale,
- * orientation, position. Returns 0, or -EINVAL and a sentence that names file and key.
+ * orientation, position, mask. Returns 0, or -EINVAL and a sentence that names file and key.
  */
 GN_MUST_USE int gn_probe_setup_read_json(const struct gn_json *object,
                                          struct gn_probe_setup *out_setup,
@@ -41,9 +44,13 @@ GN_MUST_USE int gn_probe_setup_read_json(const struct gn_json *object,
 GN_MUST_USE int gn_probe_setup_read_file(const char *path, struct gn_probe_setup *out_setup,
                                          struct gn_error *out_error);
 
+/** Different tables of responses that one process reads: a device has one. */
+#define GN_RESPONSE_JSON_TABLES 64
+
 /**
  * Reads an object's optional members response, to_rec709 and scale into *response, which keeps what
- * they do not say. Returns 0, or -EINVAL and a sentence.
+ * they do not say. A table stays in memory as long as the process does; there are at most
+ * GN_RESPONSE_JSON_TABLES different ones. Returns 0, -EINVAL, -E2BIG, -ENOMEM and a sentence.
  */
 GN_MUST_USE int gn_response_read_json(const struct gn_json *object, struct gn_response *response,
                                       struct gn_error *out_error);

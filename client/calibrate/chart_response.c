@@ -131,7 +131,13 @@ static void find_colours(const struct fit *f, double unit, struct gn_chart_respo
         struct gn_chart_point *p = &f->points[i];
         p->light = r->device[3 * p->patch + p->channel] * r->time[p->shot];
         p->error = gn_curve_decode(&r->curve, p->code) / p->light - 1;
-        if (p->patch >= GN_CHART_WHITE && !p->is_clipped && !p->is_outlier && isfinite(p->error))
+        double sigma = hypot(get_sigma(f, &f->shots[p->shot].patches[p->patch], p->channel),
+                             f->options->code_step / sqrt(12));
+        p->uncertainty = (gn_curve_decode(&r->curve, p->code + sigma) -
+                          gn_curve_decode(&r->curve, p->code - sigma)) /
+                         (2 * p->light);
+        if (p->patch >= GN_CHART_WHITE && !p->is_clipped && !p->is_outlier &&
+            p->uncertainty < GN_CHART_SURE)
             r->worst_grey = fmax(r->worst_grey, fabs(p->error));
     }
 }
@@ -159,7 +165,7 @@ static int fit_all(struct fit *f, struct gn_chart_response *r, struct gn_error *
     for (int i = 0; i < f->n_samples; i++)
         f->points[f->point_of[i]].is_outlier = f->samples[i].is_outlier;
     find_colours(f, unit, r);
-    if (f->n_channels == 3) {
+    if (f->n_channels == 3 && !f->options->has_no_matrix) {
         err = gn_chart_fit_matrix(r->device, f->options->keeps_white, &r->matrix, out_error);
         r->has_matrix = err == 0;
     }

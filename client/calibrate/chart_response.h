@@ -17,6 +17,8 @@
 #include "proto/attr.h"
 
 #define GN_CHART_MAX_SHOTS 64
+/** Codes whose light is known better than this, relative, tell how good a fit is. */
+#define GN_CHART_SURE 0.01
 
 /** One picture of the chart. */
 struct gn_chart_shot {
@@ -27,7 +29,8 @@ struct gn_chart_shot {
 
 struct gn_chart_response_options {
     enum gn_curve_model model;
-    bool is_mono;     // one channel: no matrix
+    bool is_mono; // one channel: no matrix
+    bool has_no_matrix;
     bool keeps_white; // the matrix maps the greys to grey exactly
     double code_step; // of the codes: 1 / full scale
 };
@@ -36,8 +39,9 @@ struct gn_chart_response_options {
 struct gn_chart_point {
     int shot, patch, channel;
     double code, spread;
-    double light; // what the fit takes the patch's light to be
-    double error; // light of the code over that, minus 1
+    double light;       // what the fit takes the patch's light to be
+    double error;       // light of the code over that, minus 1
+    double uncertainty; // of the code's light, relative: its noise and its steps
     bool is_clipped, is_outlier;
 };
 
@@ -50,7 +54,7 @@ struct gn_chart_response {
     int n_points;
     struct gn_chart_point *points; // [n_points], owned
     int n_clipped;
-    double worst_grey; // largest relative error of a grey patch's light, over all pictures
+    double worst_grey; // largest error of a grey patch's code that is sure to GN_CHART_SURE
 };
 
 /**

@@ -112,6 +112,8 @@ static int read_probe(const struct gn_cli_request *request, const struct gn_scen
     ret = init_projection(request, &image, &setup.projection, out_error);
     if (ret < 0)
         goto out;
+    gn_probe_mask_fill(setup.masks, setup.n_masks, image.data, image.width, image.height,
+                       image.channels, GN_PROBE_MASK_F32);
     struct gn_environment_frame frame = {
         .codes = &image,
         .code_max = is_12_bit ? 4095 : code_max[file.kind],

@@ -37,13 +37,15 @@ static void test_all_of_it(void **unused)
     (void)unused;
     struct gn_probe_setup s;
     assert_int_equal(
-        read_setup("{\"projection\":\"fisheye-kannala-brandt\",\"width\":300,\"height\":200,"
-                   "\"center\":[151,99],\"radius\":90.5,\"theta_max\":1.5,\"k\":[0.1,0.2,0.3,0.4],"
-                   "\"vignetting\":[-0.3,0.05,-0.01],"
-                   "\"pixel_format\":\"log12\",\"response\":{\"type\":\"log\",\"a\":0.5,\"b\":0.1,"
-                   "\"c\":0.01},\"to_rec709\":[1,2,0,0,1,0,0,0,1],\"scale\":2.5,"
-                   "\"orientation\":[0,1.05,0,0],\"position\":[1,2,3]}",
-                   &s, NULL),
+        read_setup(
+            "{\"projection\":\"fisheye-kannala-brandt\",\"width\":300,\"height\":200,"
+            "\"center\":[151,99],\"radius\":90.5,\"theta_max\":1.5,\"k\":[0.1,0.2,0.3,0.4],"
+            "\"vignetting\":[-0.3,0.05,-0.01],"
+            "\"pixel_format\":\"log12\",\"response\":{\"type\":\"log\",\"a\":0.5,\"b\":0.1,"
+            "\"c\":0.01},\"to_rec709\":[1,2,0,0,1,0,0,0,1],\"scale\":2.5,"
+            "\"orientation\":[0,1.05,0,0],\"position\":[1,2,3],"
+            "\"mask\":[{\"center\":[151,99],\"radius\":9.5},{\"center\":[3,4],\"radius\":1}]}",
+            &s, NULL),
         0);
     const struct gn_projection *p = &s.projection;
     assert_int_equal(p->type, GN_PROJECTION_FISHEYE_KANNALA_BRANDT);
@@ -55,6 +57,38 @@ static void test_all_of_it(void **unused)
     assert_true(s.response.log_a == 0.5 && s.response.to_rec709[1] == 2 && s.response.scale == 2.5);
     assert_true(s.world_from_probe.rotation[1] == 1.0); // made a unit one
     assert_true(s.world_from_probe.translation[2] == 3);
+    assert_int_equal(s.n_masks, 2);
+    assert_true(s.masks[0].center[1] == 99 && s.masks[0].radius == 9.5 && s.masks[1].radius == 1);
+}
+
+/* A table outlives the JSON that it came in, and the same numbers are kept once. */
+static void test_table(void **unused)
+{
+    (void)unused;
+    static const char text[] = "{\"projection\":\"angular\",\"response\":{\"type\":\"table\","
+                               "\"table\":[0,0.25,0.25,2]}}";
+    struct gn_probe_setup s, again;
+    assert_int_equal(read_setup(text, &s, NULL), 0);
+    assert_int_equal(read_setup(text, &again, NULL), 0);
+    assert_int_equal(s.response.type, GN_RESPONSE_TABLE);
+    assert_int_equal(s.response.table_size, 4);
+    assert_true(s.response.table[1] == 0.25f && s.response.table[3] == 2);
+    assert_ptr_equal(s.response.table, again.response.table);
+    assert_true(s.has_response);
+    int n = 0, ret = 0;
+    for (; n < 2 * GN_RESPONSE_JSON_TABLES && ret == 0; n++) {
+        char other[160];
+        struct gn_error e = {0};
+        snprintf(other, sizeof(other),
+                 "{\"projection\":\"angular\",\"response\":{\"type\":\"table\",\"table\":[0,%d]}}",
+                 n + 1);
+        ret = read_setup(other, &again, &e);
+        if (ret)
+            assert_string_equal(e.text, "p.json: more than 64 different response tables");
+    }
+    assert_int_equal(ret, -E2BIG);
+    assert_int_equal(n, GN_RESPONSE_JSON_TABLES);
+    assert_true(s.response.table[3] == 2);
 }
 
 /* pi as files and float32 give it is pi, from the file to the projection. */
@@ -96,6 +130,15 @@ static void test_refusals(void **unused)
          "p.json: pixel_format: expected one of 'float32', 'log12', 'linear16', found 'log14'"},
         {"{\"projection\":\"angular\",\"response\":{\"type\":\"log\",\"a\":0,\"b\":0.001,\"c\":0}}",
          "p.json: response: a log response needs"},
+        {"{\"projection\":\"angular\",\"response\":{\"type\":\"table\",\"table\":[0,2,1]}}",
+         "p.json: response.table: a response table's values must not fall"},
+        {"{\"projection\":\"angular\",\"response\":{\"type\":\"table\",\"table\":[0]}}",
+         "p.json: response.table: expected 2 to 4096 elements, found 1"},
+        {"{\"projection\":\"angular\",\"response\":{\"type\":\"table\",\"table\":[0,\"x\"]}}",
+         "p.json: response.table: element 1: expected a number, found a string"},
+        {"{\"projection\":\"angular\",\"mask\":[{\"center\":[1,2],\"radius\":0}]}",
+         "p.json: mask[0].radius: expected a number in [0.001, 16384]"},
+        {"{\"projection\":\"angular\",\"mask\":[[1,2,3]]}", "p.json: mask[0]: expected an object"},
         {"{\"projection\":\"angular\",\"to_rec709\":[1,0,0,1,0,0,0,0,1]}",
          "p.json: response: a response's matrix to Rec.709 must be finite and invertible"},
         {"{\"projection\":\"angular\",\"orientation\":[0,0,0,0]}",
@@ -118,6 +161,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_what_may_be_left_out),
         cmocka_unit_test(test_all_of_it),
+        cmocka_unit_test(test_table),
         cmocka_unit_test(test_theta_max_of_few_digits),
         cmocka_unit_test(test_refusals),
     };

@@ -1,0 +1,168 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/calibrate/draw.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "common/file.h"
+#include "common/response.h"
+
+static void put(struct gn_image8 *image, int x, int y, struct gn_ink ink)
+{
+    if (x < 0 || y < 0 || x >= image->width || y >= image->height)
+        return;
+    uint8_t *p = gn_image8_at(image, x, y);
+    p[0] = ink.r;
+    p[1] = ink.g;
+    p[2] = ink.b;
+}
+
+void gn_draw_box(struct gn_image8 *image, int x0, int y0, int x1, int y1, struct gn_ink ink)
+{
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++)
+            put(image, x, y, ink);
+}
+
+void gn_draw_dot(struct gn_image8 *image, double x, double y, double radius, struct gn_ink ink)
+{
+    if (!(fabs(x) < 1e6 && fabs(y) < 1e6))
+        return;
+    for (int v = (int)floor(y - radius); v <= y + radius; v++)
+        for (int u = (int)floor(x - radius); u <= x + radius; u++)
+            if (hypot(u + 0.5 - x, v + 0.5 - y) <= radius)
+                put(image, u, v, ink);
+}
+
+void gn_draw_line(struct gn_image8 *image, const double from[static 2], const double to[static 2],
+                  struct gn_ink ink)
+{
+    double length = fmax(fabs(to[0] - from[0]), fabs(to[1] - from[1]));
+    if (!(length < 1e5 && fabs(from[0]) < 1e6 && fabs(from[1]) < 1e6))
+        return;
+    int n = (int)ceil(length) + 1;
+    for (int i = 0; i <= n; i++) {
+        double t = (double)i / n;
+        put(image, (int)floor(from[0] + t * (to[0] - from[0])),
+            (int)floor(from[1] + t * (to[1] - from[1])), ink);
+    }
+}
+
+void gn_draw_circle(struct gn_image8 *image, double x, double y, double radius, struct gn_ink ink)
+{
+    if (!(radius < 1e5))
+        return;
+    int n = (int)(8 * radius) + 16;
+    for (int i = 0; i < n; i++) {
+        double angle = 6.283185307179586 * i / n;
+        double at_x = x + radius * cos(angle), at_y = y + radius * sin(angle);
+        if (fabs(at_x) < 1e6 && fabs(at_y) < 1e6)
+            put(image, (int)floor(at_x), (int)floor(at_y), ink);
+    }
+}
+
+enum { PLOT_W = 760, PLOT_H = 420, LEFT = 70, RIGHT = 20, TOP = 40, BOTTOM = 50 };
+
+struct range {
+    double low, high; // log10 of light
+    double error;     // the axis runs from -error to error
+};
+
+static struct range find_range(const struct gn_chart_response *r)
+{
+    struct range range = {INFINITY, -INFINITY, 0.02};
+    for (int i = 0; i < r->n_points; i++) {
+        const struct gn_chart_point *p = &r->points[i];
+        if (p->is_clipped || !(p->light > 0) || !isfinite(p->error))
+            continue;
+        range.low = fmin(range.low, floor(log10(p->light)));
+        range.high = fmax(range.high, ceil(log10(p->light)));
+        if (!p->is_outlier)
+            range.error = fmax(range.error, fmin(fabs(p->error), 0.5));
+    }
+    if (!(range.high > range.low))
+        range = (struct range){0, 1, range.error};
+    range.error = ceil(range.error * 50) / 50;
+    return range;
+}
+
+static double get_x(const struct range *range, double log_light)
+{
+    return LEFT + (PLOT_W - LEFT - RIGHT) * (log_light - range->low) / (range->high - range->low);
+}
+
+static double get_y(const struct range *range, double error)
+{
+    double share = fmin(fmax(error / range->error, -1.04), 1.04);
+    return (TOP + PLOT_H - BOTTOM) / 2.0 - share * (PLOT_H - TOP - BOTTOM) / 2.0;
+}
+
+static void print_frame(FILE *out, const struct range *range)
+{
+    fprintf(out,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
+            "font-family=\"sans-serif\" font-size=\"13\">\n"
+            "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n"
+            "<text x=\"%d\" y=\"24\">Light of each patch by the fitted response, against what all "
+            "its pictures agree on</text>\n",
+            PLOT_W, PLOT_H, LEFT);
+    for (double e = range->low; e <= range->high + 0.5; e++)
+        fprintf(out,
+                "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\" stroke=\"#ddd\"/>\n"
+                "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">1e%+.0f</text>\n",
+                get_x(range, e), get_x(range, e), TOP, PLOT_H - BOTTOM, get_x(range, e),
+                PLOT_H - BOTTOM + 18, e);
+    for (int i = -2; i <= 2; i++) {
+        double error = range->error * i / 2;
+        fprintf(out,
+                "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"%s\"/>\n"
+                "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%+.1f %%</text>\n",
+                LEFT, PLOT_W - RIGHT, get_y(range, error), get_y(range, error),
+                i == 0 ? "#888" : "#ddd", LEFT - 6, get_y(range, error) + 4, 100 * error);
+    }
+    fprintf(out,
+            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">light, a perfect white in the first "
+            "picture = 1 (hollow: left out)</text>\n",
+            (LEFT + PLOT_W - RIGHT) / 2, PLOT_H - 12);
+}
+
+static void print_point(FILE *out, const struct range *range, const struct gn_chart_point *p)
+{
+    static const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
+    if (!(p->light > 0) || !isfinite(p->error) || p->is_clipped)
+        return;
+    double rho[3];
+    int code[3];
+    gn_chart_get_reflectance(p->patch, rho);
+    for (int c = 0; c < 3; c++)
+        code[c] =
+            p->patch >= GN_CHART_WHITE ? 0 : (int)(255 * gn_response_encode(&srgb, (float)rho[c]));
+    char colour[16];
+    snprintf(colour, sizeof(colour), "#%02x%02x%02x", code[0] & 255, code[1] & 255, code[2] & 255);
+    fprintf(out, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" stroke=\"%s\" fill=\"%s\"/>\n",
+            get_x(range, log10(p->light)), get_y(range, p->error), colour,
+            p->is_outlier ? "none" : colour);
+}
+
+int gn_draw_chart_plot(const char *path, const struct gn_chart_response *response,
+                       struct gn_error *out_error)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
+    struct range range = find_range(response);
+    print_frame(out, &range);
+    for (int i = 0; i < response->n_points; i++)
+        print_point(out, &range, &response->points[i]);
+    fprintf(out, "</svg>\n");
+    int err = fclose(out) == 0 ? 0 : gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
+    if (!err)
+        err = gn_file_write(path, text, size, out_error);
+    free(text);
+    return err;
+}

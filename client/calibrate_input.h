@@ -1,0 +1,53 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * What the commands of `gnomon calibrate` share: lists of pictures, of numbers, and the commands
+ * themselves.
+ */
+#ifndef GN_CLIENT_CALIBRATE_INPUT_H
+#define GN_CLIENT_CALIBRATE_INPUT_H
+
+#include "client/capture/file.h"
+#include "common/error.h"
+#include "common/image.h"
+#include "proto/attr.h"
+
+/** argv[0] is the command's name. Each returns the process's exit status. */
+int gn_cmd_calibrate_intrinsics(int argc, char *const argv[]);
+int gn_cmd_calibrate_response(int argc, char *const argv[]);
+int gn_cmd_calibrate_probe(int argc, char *const argv[]);
+
+/** How codes of files become floats in [0, 1]. */
+struct gn_calibrate_format {
+    int full_scale16;  // largest code of 16-bit files, 0: 65535
+    const char *bayer; // NULL, or "rggb", "grbg", "gbrg", "bggr": gray files are a mosaic
+};
+
+/**
+ * Reads a picture as codes over full scale, 1 or 3 channels; a mosaic becomes RGB of half the size,
+ * each of its squares of four one pixel. *out_code_step (may be NULL): the distance of codes, 0
+ * where the file holds linear light. The caller finishes *out_image. Returns 0, or a negative errno
+ * and a sentence.
+ */
+GN_MUST_USE int gn_calibrate_read(const char *path, const struct gn_calibrate_format *format,
+                                  struct gn_image *out_image, double *out_code_step,
+                                  struct gn_error *out_error);
+
+/**
+ * Shades of 8 bits, RGB, in which things can be found whatever the exposure: from the 1st to the
+ * 99th percentile. Returns 0 or -ENOMEM; the caller finishes *out_image.
+ */
+GN_MUST_USE int gn_calibrate_stretch(const struct gn_image *image, struct gn_image8 *out_image);
+/** The same in gray. */
+GN_MUST_USE int gn_calibrate_stretch_gray(const struct gn_image *image,
+                                          struct gn_image8 *out_image);
+
+/**
+ * Numbers separated by commas or white space, fractions as 1/60; text is the list itself or the
+ * name of a file with it ('#' begins a comment). Exactly n, or n 0: up to capacity. Returns how
+ * many, or -EINVAL and a sentence.
+ */
+GN_MUST_USE int gn_calibrate_read_numbers(const char *option, const char *text, int n, int capacity,
+                                          double *out_values, struct gn_error *out_error);
+
+#endif
