@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "client/recording/session.h"
 #include "common/clock.h"
 
 int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
@@ -50,12 +51,27 @@ static const char *get_hint(int err)
     }
 }
 
+/** Begins the recording that --record asks for. */
+static int record(const struct gn_cmd_link *link, const struct gn_client_options *client_options,
+                  struct gn_client *client, struct gn_error *out_error)
+{
+    bool has_option = false;
+    for (int i = 0; i < link->program->n_options; i++)
+        has_option = has_option || strcmp(link->program->options[i].key, "record") == 0;
+    if (!has_option || !gn_options_is_set(link->options, NULL, NULL, "record"))
+        return 0;
+    return gn_recording_record_client(gn_options_get_string(link->options, NULL, NULL, "record"),
+                                      gn_options_get_bytes(link->options, NULL, NULL, "record-max"),
+                                      client_options, client, out_error);
+}
+
 int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
                       struct gn_error *out_error)
 {
     const struct gn_options *options = link->options;
     struct gn_address server = gn_options_get_address(options, NULL, NULL, "server");
     const char *text = gn_options_get_string(options, NULL, NULL, "server");
+    const char *room = gn_options_get_string(options, NULL, NULL, "room");
     *out_client = NULL;
     if (server.port == 0)
         return gn_error_set(out_error, -EINVAL, "--server %s: a server's port is in [1, 65535]",
@@ -64,11 +80,13 @@ int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_cli
         .host = server.host,
         .port = server.port,
         .role = link->role,
-        .room = gn_options_get_string(options, NULL, NULL, "room"),
+        .room = room ? room : link->room,
         .token = gn_options_get_string(options, NULL, NULL, "token"),
-        .client_name = link->program->name,
+        .client_name = link->client_name ? link->client_name : link->program->name,
         .client_version = GN_VERSION,
         .want_lighting_states = link->wants_light,
+        .want_lighting_maps = link->wants_maps,
+        .want_statistics = link->wants_statistics,
         .timeout_ms = link->timeout_ms,
     };
     struct gn_wire_fault why = {{0}};
@@ -78,10 +96,12 @@ int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_cli
     if (err)
         return gn_error_set(out_error, err, "%s: %s%s", text, why.text, get_hint(err));
     err = gn_client_sync_clock(*out_client, 8, link->timeout_ms > 0 ? link->timeout_ms : 5000);
-    if (err) {
+    if (err)
         gn_cmd_set_fault(*out_client, err, out_error);
+    else
+        err = record(link, &client_options, *out_client, out_error);
+    if (err)
         gn_client_destroy(out_client);
-    }
     return err;
 }
 
@@ -157,6 +177,7 @@ void gn_cmd_catch_signals(void)
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a file that may grow no further ends a recording, not the program
 }
 
 bool gn_cmd_is_interrupted(void)

@@ -17,13 +17,14 @@
 /** argv[0] is the command's name. Each returns the process's exit status. */
 int gn_cmd_calibrate(int argc, char *const argv[]);
 int gn_cmd_probe(int argc, char *const argv[]);
+int gn_cmd_replay(int argc, char *const argv[]);
 int gn_cmd_screen(int argc, char *const argv[]);
 int gn_cmd_track(int argc, char *const argv[]);
 int gn_cmd_view(int argc, char *const argv[]);
 int gn_cmd_doctor(int argc, char *const argv[]);
 
-/** Rows of the option table that every command which connects has. */
-#define GN_CMD_CONNECT_OPTIONS                                                                     \
+/** Rows of the option table that say where the server is. */
+#define GN_CMD_SERVER_OPTIONS                                                                      \
     {.key = "server",                                                                              \
      .flag = "server",                                                                             \
      .type = GN_OPTION_ADDRESS,                                                                    \
@@ -38,6 +39,22 @@ int gn_cmd_doctor(int argc, char *const argv[]);
         .key = "token", .flag = "token", .type = GN_OPTION_STRING, .value_name = "SECRET",         \
         .is_secret = true,                                                                         \
         .help = "The secret that the server asks for, if it does; gnomond 0.1 knows none."         \
+    }
+
+/** Rows of the option table that every command has whose session can be recorded. */
+#define GN_CMD_CONNECT_OPTIONS                                                                     \
+    GN_CMD_SERVER_OPTIONS,                                                                         \
+        {.key = "record",                                                                          \
+         .flag = "record",                                                                         \
+         .type = GN_OPTION_STRING,                                                                 \
+         .value_name = "FILE",                                                                     \
+         .help = "Record all that is sent and comes back, with its times, for gnomon replay. "     \
+                 "Commands that run on one machine may share the file; a recording that is there " \
+                 "is added to."},                                                                  \
+    {                                                                                              \
+        .key = "record-max", .flag = "record-max", .type = GN_OPTION_BYTES, .min = 4096,           \
+        .max = 1e15, .default_value = "4GiB",                                                      \
+        .help = "The recording ends, and the session goes on, where the file would grow larger."   \
     }
 
 /**
@@ -55,17 +72,21 @@ struct gn_cmd_link {
     const struct gn_program *program;
     const struct gn_options *options; // --server, --room and --token
     enum gn_msg_role role;
-    bool wants_light; // LIGHTING_STATE, without maps
-    int timeout_ms;   // of each step, > 0, default 5000
+    bool wants_light; // LIGHTING_STATE
+    bool wants_maps;  // ... with maps
+    bool wants_statistics;
+    const char *room;        // where --room is not given, default the server's first
+    const char *client_name; // default the program's
+    int timeout_ms;          // of each step, > 0, default 5000
 };
-/** Connects and synchronises the clock. Returns 0, or a negative errno and a sentence.
- * Thread-safety: safe. */
+/** Connects, synchronises the clock, and records as --record says, if the command has that. Returns
+ * 0, or a negative errno and a sentence. Thread-safety: safe. */
 GN_MUST_USE int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
                                   struct gn_error *out_error);
 
 /**
- * Connects as --server, --room and --token say and synchronises the clock. Returns 0, or a negative
- * errno and a sentence.
+ * Connects as --server, --room and --token say, synchronises the clock, and records as --record
+ * says, if the command has that. Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_cmd_connect(const struct gn_program *program, const struct gn_options *options,
                                enum gn_msg_role role, struct gn_client **out_client,

@@ -18,7 +18,7 @@
 #include "proto/attr.h"
 
 static const struct gn_option option_table[] = {
-    GN_CMD_CONNECT_OPTIONS,
+    GN_CMD_SERVER_OPTIONS,
 };
 
 static const struct gn_program program = {

@@ -20,6 +20,7 @@ static const struct {
     {"track", gn_cmd_track, "stream poses of an object of the scene: it moves"},
     {"view", gn_cmd_view, "stream camera frames and poses, write the composited frames"},
     {"calibrate", gn_cmd_calibrate, "measure a camera or a probe from pictures"},
+    {"replay", gn_cmd_replay, "send a recording's messages again, to the bit"},
     {"doctor", gn_cmd_doctor, "say what on this machine works"},
 };
 

@@ -297,8 +297,15 @@ int gn_conn_send(struct gn_conn *conn, uint16_t type, const void *msg, struct gn
     // No type's limit is as high: gn_wire_encode() refuses it in words.
     uint32_t payload_bytes = payload_len < UINT32_MAX ? (uint32_t)payload_len : UINT32_MAX;
     int err = gn_wire_encode(type, msg, payload_bytes, head, sizeof(head), &head_len, out_fault);
-    if (err)
-        return err;
+    return err ? err : gn_conn_send_encoded(conn, head, head_len, payload, out_fault);
+}
+
+int gn_conn_send_encoded(struct gn_conn *conn, const uint8_t *head, size_t head_len,
+                         struct gn_buf *payload, struct gn_wire_fault *out_fault)
+{
+    size_t payload_len = payload ? payload->len : 0;
+    if (conn->is_torn)
+        return -EPIPE;
     size_t bytes = head_len + payload_len;
     if (conn->count == QUEUE_SLOTS || bytes > conn->max_queued_bytes - conn->queued_bytes) {
         if (out_fault)

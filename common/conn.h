@@ -100,6 +100,13 @@ struct gn_envelope gn_conn_get_envelope(const struct gn_conn *conn);
 GN_MUST_USE int gn_conn_send(struct gn_conn *conn, uint16_t type, const void *msg,
                              struct gn_buf *payload, struct gn_wire_fault *out_fault);
 
+/**
+ * As gn_conn_send, of what is encoded already: head, copied, holds the envelope and the header, and
+ * whoever encoded them has checked them.
+ */
+GN_MUST_USE int gn_conn_send_encoded(struct gn_conn *conn, const uint8_t *head, size_t head_len,
+                                     struct gn_buf *payload, struct gn_wire_fault *out_fault);
+
 /** Write what is queued. Returns 1 all written, 0 would block, or the stream's negative errno. */
 GN_MUST_USE int gn_conn_flush(struct gn_conn *conn);
 

@@ -9,8 +9,23 @@
 
 #define GN_CLIENT_MAX_KEPT 64
 
+/**
+ * Sees every message of a connection, PING and PONG too: one that was sent once it has gone, one
+ * that came before anything is done with it. head: envelope and header; all borrowed for the call.
+ * time_ns: own monotonic clock, when sending began, or when the message was whole.
+ */
+typedef void (*gn_client_tap_fn)(void *ctx, bool is_sent, int64_t time_ns, const uint8_t *head,
+                                 size_t head_bytes, const void *payload, size_t payload_bytes);
+
+struct gn_client_tap {
+    gn_client_tap_fn take;    // NULL: none
+    void (*close)(void *ctx); // when the client is destroyed
+    void *ctx;
+};
+
 struct gn_client {
     struct gn_conn *conn;
+    struct gn_client_tap tap;
     struct gn_msg_welcome welcome;
     struct gn_wire_fault fault;
     int timeout_ms;
@@ -41,6 +56,14 @@ int64_t gn_client_get_deadline(int timeout_ms);
 GN_MUST_USE int gn_client_send(struct gn_client *client, enum gn_wire_type type, const void *msg,
                                const void *payload, size_t payload_bytes);
 
+/** As gn_client_send, of a head that is encoded already. */
+GN_MUST_USE int gn_client_send_encoded(struct gn_client *client, const uint8_t *head,
+                                       size_t head_bytes, const void *payload,
+                                       size_t payload_bytes);
+
+/** From now on tap sees what is sent and what comes; one per client. Taken over by the client. */
+void gn_client_set_tap(struct gn_client *client, const struct gn_client_tap *tap);
+
 /** Read until one message is there. Returns 1, 0 at the deadline, negative errno. */
 GN_MUST_USE int gn_client_receive(struct gn_client *client, int64_t deadline_ns,
                                   struct gn_conn_message *out);
@@ -48,6 +71,10 @@ GN_MUST_USE int gn_client_receive(struct gn_client *client, int64_t deadline_ns,
 /** gn_conn_decode(); a server that sends what cannot be decoded is lost (-EPROTO). */
 GN_MUST_USE int gn_client_decode(struct gn_client *client, const struct gn_conn_message *message,
                                  union gn_wire_message *out);
+
+/** The HELLO that opts ask for. Returns 0, or -EINVAL and the reason. */
+GN_MUST_USE int gn_client_fill_hello(const struct gn_client_options *opts,
+                                     struct gn_msg_hello *hello, struct gn_wire_fault *why);
 
 /** Connect and be welcomed; one REDIRECT is followed. Returns as gn_client_connect(). */
 GN_MUST_USE int gn_client_say_hello(struct gn_client *client, const struct gn_client_options *opts);

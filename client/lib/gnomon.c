@@ -45,6 +45,8 @@ void gn_client_destroy(struct gn_client **client)
     }
     gn_buf_unref(&c->payload);
     gn_conn_destroy(&c->conn);
+    if (c->tap.close)
+        c->tap.close(c->tap.ctx);
     free(c);
 }
 

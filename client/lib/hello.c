@@ -30,8 +30,8 @@ static int set_field(char *out, size_t cap, const char *text, const char *fallba
     return strcmp(out, from) == 0 ? 0 : -EINVAL; // a cut token or room is another one
 }
 
-static int fill_hello(const struct gn_client_options *opts, struct gn_msg_hello *hello,
-                      struct gn_wire_fault *why)
+int gn_client_fill_hello(const struct gn_client_options *opts, struct gn_msg_hello *hello,
+                         struct gn_wire_fault *why)
 {
     *hello = (struct gn_msg_hello){
         .version_min = GN_PROTO_VERSION_MIN,
@@ -111,7 +111,7 @@ static int shake_hands(struct gn_client *client, const struct gn_msg_hello *hell
 int gn_client_say_hello(struct gn_client *client, const struct gn_client_options *opts)
 {
     struct gn_msg_hello hello;
-    int err = fill_hello(opts, &hello, &client->fault);
+    int err = gn_client_fill_hello(opts, &hello, &client->fault);
     if (err)
         return err;
     struct gn_msg_redirect redirect;

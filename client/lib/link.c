@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "client/lib/client.h"
 #include "common/clock.h"
@@ -75,20 +76,55 @@ static void release_borrowed(struct gn_buf *buf)
     (void)buf; // the struct is on gn_client_send()'s stack, the bytes are the caller's
 }
 
-int gn_client_send(struct gn_client *client, enum gn_wire_type type, const void *msg,
-                   const void *payload, size_t payload_bytes)
+int gn_client_send_encoded(struct gn_client *client, const uint8_t *head, size_t head_bytes,
+                           const void *payload, size_t payload_bytes)
 {
     if (client->lost)
         return client->lost;
     struct gn_buf buf;
+    int64_t begin_ns = gn_clock_get_monotonic_ns();
     // Nothing writes through a queued payload.
     gn_buf_init(&buf, (uint8_t *)(uintptr_t)payload, payload_bytes, release_borrowed, NULL);
-    int err = gn_conn_send(client->conn, type, msg, payload_bytes ? &buf : NULL, &client->fault);
+    int err = gn_conn_send_encoded(client->conn, head, head_bytes, payload_bytes ? &buf : NULL,
+                                   &client->fault);
     if (!err)
         err = flush_all(client);
     if (err && gn_conn_get_queued_bytes(client->conn) > 0)
         gn_conn_drop_queued(client->conn); // buf goes out of scope
+    if (!err && client->tap.take)
+        client->tap.take(client->tap.ctx, true, begin_ns, head, head_bytes, payload, payload_bytes);
     return err;
+}
+
+int gn_client_send(struct gn_client *client, enum gn_wire_type type, const void *msg,
+                   const void *payload, size_t payload_bytes)
+{
+    uint8_t head[GN_WIRE_HEAD_BYTES];
+    size_t head_bytes = 0;
+    if (client->lost)
+        return client->lost;
+    // No type's limit is as high: gn_wire_encode() refuses it in words.
+    uint32_t bytes = payload_bytes < UINT32_MAX ? (uint32_t)payload_bytes : UINT32_MAX;
+    int err = gn_wire_encode(type, msg, bytes, head, sizeof(head), &head_bytes, &client->fault);
+    return err ? err : gn_client_send_encoded(client, head, head_bytes, payload, payload_bytes);
+}
+
+void gn_client_set_tap(struct gn_client *client, const struct gn_client_tap *tap)
+{
+    client->tap = *tap;
+}
+
+/** Shows the tap what came. */
+static void tap_received(struct gn_client *client, const struct gn_conn_message *message)
+{
+    uint8_t head[GN_ENVELOPE_BYTES + GN_LIMIT_HEADER_BYTES];
+    size_t n = message->envelope.header_bytes;
+    gn_envelope_encode(&message->envelope, head);
+    if (n > 0)
+        memcpy(head + GN_ENVELOPE_BYTES, message->header, n);
+    client->tap.take(client->tap.ctx, false, gn_clock_get_monotonic_ns(), head,
+                     GN_ENVELOPE_BYTES + n, message->payload ? message->payload->data : NULL,
+                     message->payload ? message->payload->len : 0);
 }
 
 int gn_client_receive(struct gn_client *client, int64_t deadline_ns, struct gn_conn_message *out)
@@ -97,6 +133,8 @@ int gn_client_receive(struct gn_client *client, int64_t deadline_ns, struct gn_c
         return client->lost;
     for (;;) {
         int n = gn_conn_read(client->conn, out);
+        if (n > 0 && client->tap.take)
+            tap_received(client, out);
         if (n > 0)
             return n;
         if (n < 0)

@@ -9,7 +9,8 @@ import subprocess
 import sys
 
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
-CONNECT = {'server', 'room', 'token'}
+SERVER = {'server', 'room', 'token'}
+CONNECT = SERVER | {'record', 'record-max'}
 FEED = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
 LIVE = {'gige', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format'}
 # What users and tools rely on. A star: there may be more.
@@ -20,7 +21,9 @@ OPTIONS = [
     ([GNOMON, 'view'], CONNECT | FEED | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
                                                   'quality', 'budget-ms', 'outstanding',
                                                   'match', 'sync-light'}),
-    ([GNOMON, 'doctor'], CONNECT),
+    ([GNOMON, 'replay'], CONNECT | {'info', 'streams', 'rate-factor', 'as-fast-as-possible',
+                                    'open-loop', 'pin-light', 'loop', 'out', 'expect-equal'}),
+    ([GNOMON, 'doctor'], SERVER),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
     ([RENDER], {'scene', 'env', 'env-projection', 'env-params', 'world-from-env', 'camera',
                 'background', 'quality', 'budget-ms', 'lights', 'light-method', 'bounces',
