@@ -19,9 +19,9 @@
 #define FIRST_STALL_NS (5 * GN_NS_PER_S)
 /** Frame time where the driver does not say. */
 #define DEFAULT_FRAME_NS GN_NS_PER_S
-/** A time of the driver may lie so far in the past, and in the future. */
+/** A time of the driver may lie so far in the past, and in the future: some compute it. */
 #define MAX_AGE_NS (10 * GN_NS_PER_S)
-#define MAX_AHEAD_NS GN_NS_PER_MS
+#define MAX_AHEAD_NS (100 * GN_NS_PER_MS)
 
 struct v4l2_source {
     struct gn_source head;
@@ -108,7 +108,8 @@ static void lose(struct v4l2_source *s, const char *why)
     s->retry_ns = now_ns(s); // at once: it may only have changed
 }
 
-/** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC. */
+/** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC, never later
+ * than now. */
 static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
 {
     int64_t now = now_ns(s), sec = b->timestamp.tv_sec, usec = b->timestamp.tv_usec;
@@ -117,7 +118,7 @@ static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
     if (is_monotonic && sec >= 0 && sec < INT64_MAX / GN_NS_PER_S && usec >= 0 && usec < 1000000) {
         int64_t t = sec * GN_NS_PER_S + usec * GN_NS_PER_US;
         if (t >= now - MAX_AGE_NS && t <= now + MAX_AHEAD_NS)
-            return t;
+            return t < now ? t : now;
     }
     if (!s->has_told_time)
         gn_error_set(&s->news, 0,

@@ -23,7 +23,7 @@ SERVER = {
 RIG_SERVER = {"server/scene/rt.h", "server/scene/mesh.h"}
 RIG_NOT_COMMON = {"common/projection.h", "common/response.h", "common/camera.h",
                   "common/composite.h"}
-SUITES = ["unit", "kernel", "golden", "numeric", "fuzz", "e2e", "style", "truth"]
+SUITES = ["unit", "kernel", "golden", "numeric", "fuzz", "e2e", "style", "truth", "vm"]
 SOURCE = re.compile(r"\.(c|h|cc|cpp|hpp)$")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
