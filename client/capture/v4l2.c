@@ -108,6 +108,14 @@ static void lose(struct v4l2_source *s, const char *why)
     s->retry_ns = now_ns(s); // at once: it may only have changed
 }
 
+/** The middle of the exposure, where its length was set: drivers stamp its beginning or its end. */
+static int64_t move_to_middle(const struct v4l2_source *s, const struct v4l2_buffer *b, int64_t t)
+{
+    int64_t half_ns = (int64_t)(s->options.exposure_us * 500);
+    bool is_start = (b->flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+    return is_start ? t + half_ns : t - half_ns;
+}
+
 /** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC, never later
  * than now. */
 static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
@@ -118,7 +126,7 @@ static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
     if (is_monotonic && sec >= 0 && sec < INT64_MAX / GN_NS_PER_S && usec >= 0 && usec < 1000000) {
         int64_t t = sec * GN_NS_PER_S + usec * GN_NS_PER_US;
         if (t >= now - MAX_AGE_NS && t <= now + MAX_AHEAD_NS)
-            return t < now ? t : now;
+            return move_to_middle(s, b, t < now ? t : now);
     }
     if (!s->has_told_time)
         gn_error_set(&s->news, 0,

@@ -15,9 +15,10 @@
  * not have; the sentence names what it has), or another negative errno, and a sentence.
  *
  * Pictures: YUYV and NV12 are converted to RGB8 by the matrix and range that the driver names;
- * MJPEG is given as it is; GREY as RGB8; RGB3, BGR3 as RGB8; Y10 and Y16 as MONO16, Y12 as MONO12;
- * with is_8_bit the upper eight bits of these as RGB8. Luma alone is given in the camera's codes.
- * Times are the driver's where it has CLOCK_MONOTONIC. A camera that is unplugged is opened again
+ * MJPEG is given as it is; RGB3, BGR3 as RGB8; GREY, Y10 and Y16 as MONO16, Y12 as MONO12; with
+ * is_8_bit the upper eight bits of these as RGB8. Luma alone is given in the camera's codes.
+ * Times are the driver's where it has CLOCK_MONOTONIC, moved to the middle of the exposure where
+ * that was set. A camera that is unplugged is opened again
  * when it is back, and set as it was.
  */
 GN_MUST_USE int gn_v4l2_open(const struct gn_live_options *options, struct gn_source **out_source,

@@ -77,7 +77,7 @@ static int32_t to_fixed(double x)
 }
 
 /** The matrix and range that the driver names, or those that V4L2 lays down where it names none. */
-static int init_yuv(const struct v4l2_pix_format *pix, int32_t yuv[static 6],
+static int init_yuv(const struct v4l2_pix_format *pix, struct gn_v4l2_yuv *yuv,
                     struct gn_error *out_error)
 {
     uint32_t encoding =
@@ -93,12 +93,12 @@ static int init_yuv(const struct v4l2_pix_format *pix, int32_t yuv[static 6],
                             encoding);
     bool is_full = range == V4L2_QUANTIZATION_FULL_RANGE;
     double kg = 1 - kr - kb, luma = is_full ? 1 : 255.0 / 219, chroma = is_full ? 1 : 255.0 / 224;
-    yuv[0] = to_fixed(luma);
-    yuv[1] = is_full ? 0 : 16;
-    yuv[2] = to_fixed(chroma * 2 * (1 - kr));
-    yuv[3] = to_fixed(-chroma * 2 * (1 - kb) * kb / kg);
-    yuv[4] = to_fixed(-chroma * 2 * (1 - kr) * kr / kg);
-    yuv[5] = to_fixed(chroma * 2 * (1 - kb));
+    yuv->luma = to_fixed(luma);
+    yuv->black = is_full ? 0 : 16;
+    yuv->v_r = to_fixed(chroma * 2 * (1 - kr));
+    yuv->u_g = to_fixed(-chroma * 2 * (1 - kb) * kb / kg);
+    yuv->v_g = to_fixed(-chroma * 2 * (1 - kr) * kr / kg);
+    yuv->u_b = to_fixed(chroma * 2 * (1 - kb));
     return 0;
 }
 
@@ -135,13 +135,13 @@ static void init_output(bool is_8_bit, struct gn_v4l2_layout *l)
         l->is_borrowed = true;
         return;
     }
-    bool is_wide = l->pixels->depth > 8 && !is_8_bit;
+    bool is_wide = !is_8_bit && (l->pixels->depth > 8 || l->pixels->fourcc == V4L2_PIX_FMT_GREY);
     l->format = !is_wide                 ? GN_CAPTURE_RGB8
                 : l->pixels->depth == 12 ? GN_CAPTURE_MONO12
                                          : GN_CAPTURE_MONO16;
     l->n_out_bytes = n * (is_wide ? 2 : 3);
     bool has_same_pixels =
-        l->pixels->fourcc == V4L2_PIX_FMT_RGB24 || (is_wide && l->pixels->depth != 10);
+        l->pixels->fourcc == V4L2_PIX_FMT_RGB24 || (is_wide && l->pixels->depth >= 12);
     l->is_borrowed = has_same_pixels && l->n_bytes == l->n_out_bytes;
 }
 
@@ -166,7 +166,7 @@ int gn_v4l2_layout_init(const struct v4l2_pix_format *pix, bool is_8_bit,
     l.height = (int)pix->height;
     int err = l.pixels->bits ? init_rows(pix, &l, out_error) : 0;
     if (!err && (pix->pixelformat == V4L2_PIX_FMT_YUYV || pix->pixelformat == V4L2_PIX_FMT_NV12))
-        err = init_yuv(pix, l.yuv, out_error);
+        err = init_yuv(pix, &l.yuv, out_error);
     bool is_rgb = pix->pixelformat == V4L2_PIX_FMT_RGB24 || pix->pixelformat == V4L2_PIX_FMT_BGR24;
     if (!err && is_rgb && pix->quantization == V4L2_QUANTIZATION_LIM_RANGE)
         err = gn_error_set(out_error, -EINVAL, "RGB in limited range; ask for YUYV or NV12");
@@ -177,7 +177,7 @@ int gn_v4l2_layout_init(const struct v4l2_pix_format *pix, bool is_8_bit,
     return 0;
 }
 
-static uint8_t clamp8(int32_t fixed)
+static inline uint8_t clamp8(int32_t fixed)
 {
     int32_t code = fixed >> FIXED_BITS;
     return (uint8_t)(code < 0 ? 0 : code > 255 ? 255 : code);
@@ -188,44 +188,51 @@ struct chroma {
     int32_t r, g, b;
 };
 
-static struct chroma get_chroma(const int32_t yuv[static 6], int u, int v)
+static inline struct chroma get_chroma(struct gn_v4l2_yuv yuv, int u, int v)
 {
     int32_t half = 1 << (FIXED_BITS - 1);
     u -= 128;
     v -= 128;
-    return (struct chroma){yuv[2] * v + half, yuv[3] * u + yuv[4] * v + half, yuv[5] * u + half};
+    return (struct chroma){yuv.v_r * v + half, yuv.u_g * u + yuv.v_g * v + half,
+                           yuv.u_b * u + half};
 }
 
-static void put_pixel(const int32_t yuv[static 6], int y, const struct chroma *c, uint8_t *rgb)
+static inline void put_pixel(struct gn_v4l2_yuv yuv, int y, struct chroma c, uint8_t *rgb)
 {
-    int32_t luma = yuv[0] * (y - yuv[1]);
-    rgb[0] = clamp8(luma + c->r);
-    rgb[1] = clamp8(luma + c->g);
-    rgb[2] = clamp8(luma + c->b);
+    int32_t luma = yuv.luma * (y - yuv.black);
+    rgb[0] = clamp8(luma + c.r);
+    rgb[1] = clamp8(luma + c.g);
+    rgb[2] = clamp8(luma + c.b);
 }
 
+/** What the loops read is kept in variables: bytes that are written might be anything else. */
 static void convert_yuyv(const struct gn_v4l2_layout *l, const uint8_t *data, uint8_t *out)
 {
-    for (int y = 0; y < l->height; y++) {
-        const uint8_t *row = data + (size_t)y * l->stride;
-        for (int x = 0; x < l->width; x += 2, row += 4, out += 6) {
-            struct chroma c = get_chroma(l->yuv, row[1], row[3]);
-            put_pixel(l->yuv, row[0], &c, out);
-            put_pixel(l->yuv, row[2], &c, out + 3);
+    const struct gn_v4l2_yuv yuv = l->yuv;
+    const int width = l->width, height = l->height;
+    const size_t stride = l->stride;
+    for (int y = 0; y < height; y++) {
+        const uint8_t *row = data + (size_t)y * stride;
+        for (int x = 0; x < width; x += 2, row += 4, out += 6) {
+            struct chroma c = get_chroma(yuv, row[1], row[3]);
+            put_pixel(yuv, row[0], c, out);
+            put_pixel(yuv, row[2], c, out + 3);
         }
     }
 }
 
 static void convert_nv12(const struct gn_v4l2_layout *l, const uint8_t *data, uint8_t *out)
 {
-    const uint8_t *chroma = data + (size_t)l->height * l->stride;
-    for (int y = 0; y < l->height; y++) {
-        const uint8_t *row = data + (size_t)y * l->stride;
-        const uint8_t *uv = chroma + (size_t)(y / 2) * l->stride;
-        for (int x = 0; x < l->width; x += 2, out += 6) {
-            struct chroma c = get_chroma(l->yuv, uv[x], uv[x + 1]);
-            put_pixel(l->yuv, row[x], &c, out);
-            put_pixel(l->yuv, row[x + 1], &c, out + 3);
+    const struct gn_v4l2_yuv yuv = l->yuv;
+    const int width = l->width, height = l->height;
+    const size_t stride = l->stride;
+    const uint8_t *chroma = data + (size_t)height * stride;
+    for (int y = 0; y < height; y++) {
+        const uint8_t *row = data + (size_t)y * stride, *uv = chroma + (size_t)(y / 2) * stride;
+        for (int x = 0; x < width; x += 2, out += 6) {
+            struct chroma c = get_chroma(yuv, uv[x], uv[x + 1]);
+            put_pixel(yuv, row[x], c, out);
+            put_pixel(yuv, row[x + 1], c, out + 3);
         }
     }
 }
@@ -267,15 +274,17 @@ static void convert_gray(const struct gn_v4l2_layout *l, const uint8_t *data, ui
     }
 }
 
-/** Codes of 10 bits to the same share of 16; of 12 and 16 bits, whose rows are padded, as they
- * are. */
+/** Codes of 8 and 10 bits to the same share of 16; of 12 and 16 bits, whose rows are padded, as
+ * they are. */
 static void convert_wide(const struct gn_v4l2_layout *l, const uint8_t *data, uint8_t *out)
 {
     for (int y = 0; y < l->height; y++) {
         const uint8_t *row = data + (size_t)y * l->stride;
-        for (int x = 0; x < l->width; x++, row += 2, out += 2) {
-            unsigned code = get_code16(row);
-            if (l->pixels->depth == 10)
+        for (int x = 0; x < l->width; x++, out += 2) {
+            unsigned code = l->pixels->bits == 8 ? row[x] : get_code16(row + 2 * (size_t)x);
+            if (l->pixels->depth == 8)
+                code *= 257;
+            else if (l->pixels->depth == 10)
                 code = code << 6 | code >> 4;
             out[0] = (uint8_t)code;
             out[1] = (uint8_t)(code >> 8);

@@ -33,6 +33,11 @@ const struct gn_v4l2_pixels *gn_v4l2_pixels_find(uint32_t fourcc);
  * "-BE". */
 void gn_v4l2_pixels_print_fourcc(uint32_t fourcc, char out[static 8]);
 
+/** YUV to RGB in 2^20ths: what luma above black counts, and how U and V get into R, G, B. */
+struct gn_v4l2_yuv {
+    int32_t luma, black, v_r, u_g, v_g, u_b;
+};
+
 /** How the pictures of a camera lie in its buffers, checked. A value. */
 struct gn_v4l2_layout {
     const struct gn_v4l2_pixels *pixels;
@@ -42,7 +47,7 @@ struct gn_v4l2_layout {
     enum gn_capture_format format;
     size_t n_out_bytes; // of a picture as it is given; 0: compressed
     bool is_borrowed;   // given as it lies in the buffer
-    int32_t yuv[6];     // YUV to RGB, 2^20: y, black, v to r, u to g, v to g, u to b
+    struct gn_v4l2_yuv yuv;
 };
 
 /**

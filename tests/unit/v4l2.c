@@ -147,6 +147,23 @@ static void test_bad_buffers_are_counted_and_not_given(void **state)
     gn_fake_finish(&fake);
 }
 
+/* The exposure is 8 ms and is stamped at its beginning, or at its end. */
+static void test_times_are_the_middle_of_the_exposure(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){.exposure_us = 8000});
+    int64_t taken_ns = fake.now_ns;
+    gn_fake_fill(&fake, 0, 128)->flags |= V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+    fake.now_ns += 20 * GN_NS_PER_MS;
+    assert_int_equal(read_picture(source).time_ns, taken_ns + 4 * GN_NS_PER_MS);
+    gn_fake_fill(&fake, 1, 128);
+    assert_int_equal(read_picture(source).time_ns, fake.now_ns - 4 * GN_NS_PER_MS);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 /* Some drivers compute their times, which run ahead a little. */
 static void test_times_are_never_ahead(void **state)
 {
@@ -479,6 +496,7 @@ int main(void)
         cmocka_unit_test(test_pictures_come_with_their_time),
         cmocka_unit_test(test_newest_wins_and_gaps_are_counted),
         cmocka_unit_test(test_bad_buffers_are_counted_and_not_given),
+        cmocka_unit_test(test_times_are_the_middle_of_the_exposure),
         cmocka_unit_test(test_times_are_never_ahead),
         cmocka_unit_test(test_times_that_are_none),
         cmocka_unit_test(test_unplugged_and_plugged_in_again),

@@ -160,7 +160,7 @@ static void test_rgb_and_gray(void **state)
         int n = cases[i / 2].n_bytes, stride = n * WIDTH + i % 2 * 5;
         struct v4l2_pix_format pix =
             make_format(cases[i / 2].fourcc, WIDTH, HEIGHT, (uint32_t)stride, HEIGHT);
-        struct gn_v4l2_layout layout = make_layout(&pix, i % 2);
+        struct gn_v4l2_layout layout = make_layout(&pix, true);
         assert_int_equal(layout.is_borrowed, i == 0); // RGB3 without padding needs no copy
         assert_int_equal(layout.format, GN_CAPTURE_RGB8);
         assert_int_equal(layout.n_out_bytes, sizeof(rgb));
@@ -175,7 +175,7 @@ static void test_rgb_and_gray(void **state)
     }
 }
 
-/* Codes of 10, 12 and 16 bits, in the low bits of two bytes: all values. */
+/* Codes of 8 bits, and of 10, 12 and 16 in the low bits of two bytes: all values. */
 static void test_wide_codes(void **state)
 {
     (void)state;
@@ -184,23 +184,26 @@ static void test_wide_codes(void **state)
         int bits;
         enum gn_capture_format format;
         int max_out;
-    } cases[] = {{V4L2_PIX_FMT_Y10, 10, GN_CAPTURE_MONO16, 65535},
+    } cases[] = {{V4L2_PIX_FMT_GREY, 8, GN_CAPTURE_MONO16, 65535},
+                 {V4L2_PIX_FMT_Y10, 10, GN_CAPTURE_MONO16, 65535},
                  {V4L2_PIX_FMT_Y12, 12, GN_CAPTURE_MONO12, 4095},
                  {V4L2_PIX_FMT_Y16, 16, GN_CAPTURE_MONO16, 65535}};
     enum { WIDTH = 64 };
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 8; i++) {
         int bits = cases[i / 2].bits, height = (1 << bits) / WIDTH;
-        int stride = 2 * WIDTH + i % 2 * 6;
+        int size = bits == 8 ? 1 : 2, stride = size * WIDTH + i % 2 * 6;
         struct v4l2_pix_format pix = make_format(cases[i / 2].fourcc, WIDTH, (uint32_t)height,
                                                  (uint32_t)stride, (uint32_t)height);
         struct gn_v4l2_layout wide = make_layout(&pix, false), narrow = make_layout(&pix, true);
         assert_int_equal(wide.format, cases[i / 2].format);
-        assert_int_equal(wide.is_borrowed, bits != 10 && i % 2 == 0);
+        assert_int_equal(wide.is_borrowed, bits >= 12 && i % 2 == 0);
         assert_int_equal(narrow.format, GN_CAPTURE_RGB8);
         uint8_t *data = make_bytes(wide.n_bytes);
         for (int k = 0; k < 1 << bits; k++) {
-            data[stride * (k / WIDTH) + 2 * (k % WIDTH)] = (uint8_t)k;
-            data[stride * (k / WIDTH) + 2 * (k % WIDTH) + 1] = (uint8_t)(k >> 8);
+            uint8_t *code = data + stride * (k / WIDTH) + size * (k % WIDTH);
+            code[0] = (uint8_t)k;
+            if (size == 2)
+                code[1] = (uint8_t)(k >> 8);
         }
         assert_true(gn_v4l2_has_sound_codes(&wide, data));
         uint8_t *out = malloc(wide.n_out_bytes), *rgb = malloc(narrow.n_out_bytes);
@@ -216,7 +219,7 @@ static void test_wide_codes(void **state)
                 assert_int_equal(rgb[3 * k + c], k / (1 << (bits - 8)));
         }
         data[wide.n_bytes - 1] = (uint8_t)(1 << (bits - 8)); // one bit too high, in the last code
-        assert_int_equal(gn_v4l2_has_sound_codes(&wide, data), bits == 16);
+        assert_int_equal(gn_v4l2_has_sound_codes(&wide, data), bits == 16 || bits == 8);
         free(rgb);
         free(out);
         free(data);
