@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "proto/attr.h"
+
 #define MAX_SIDE_PX 16384
 
 static int count_channels(const struct gn_pixels_format *f)
@@ -98,74 +100,85 @@ static unsigned unpack(const struct gn_pixels_format *f, const uint8_t *source, 
     return all;
 }
 
-/** Writes codes of bits bits as 8 or as 12 or 16, each n_copies times. */
+/** How codes are written: scaled, as 8 or 16 bits. */
 struct writer {
     unsigned from; // largest code that comes
     unsigned to;   // that goes
     bool is_8_bit;
 };
 
-static unsigned scale_code(const struct writer *w, unsigned code)
+/**
+ * Writes n codes, the first as number at. Rounding in double is exact: code * to / from is never
+ * half-way between two numbers, since from is odd, and never nearer to it than 1 / (2 from).
+ */
+static void write_codes(const struct writer *w, const uint16_t *codes, size_t n, void *out,
+                        size_t at)
 {
-    return w->from == w->to ? code : (code * w->to + w->from / 2) / w->from; // below 2^32
+    double factor = (double)w->to / w->from;
+    uint8_t *out8 = (uint8_t *)out + at;
+    uint16_t *out16 = (uint16_t *)out + at;
+    if (w->from == w->to && w->is_8_bit) {
+        for (size_t i = 0; i < n; i++)
+            out8[i] = (uint8_t)codes[i];
+    } else if (w->from == w->to) {
+        memcpy(out16, codes, n * sizeof(*out16));
+    } else if (w->is_8_bit) {
+        for (size_t i = 0; i < n; i++)
+            out8[i] = (uint8_t)(int)(codes[i] * factor + 0.5);
+    } else {
+        for (size_t i = 0; i < n; i++)
+            out16[i] = (uint16_t)(int)(codes[i] * factor + 0.5);
+    }
 }
 
-static void write_code(const struct writer *w, void *out, size_t i, unsigned code)
-{
-    unsigned scaled = scale_code(w, code);
-    if (w->is_8_bit)
-        ((uint8_t *)out)[i] = (uint8_t)scaled;
-    else
-        ((uint16_t *)out)[i] = (uint16_t)scaled;
-}
-
-/** Mirrored at the ends without repeating them: a mosaic keeps its order. */
-static int mirror(int i, int n)
-{
-    return i < 0 ? -i : i >= n ? 2 * n - 2 - i : i;
-}
-
-/** One row of a mosaic; above, row, below: its samples and its neighbours'. */
-static void interpolate_row(const struct gn_pixels_format *f, const struct writer *w, int y,
-                            int width, const uint16_t *above, const uint16_t *row,
-                            const uint16_t *below, void *out)
+/** One row of a mosaic; each row has one mirrored sample more at both ends. */
+static void interpolate_row(const struct gn_pixels_format *f, int y, int width,
+                            const uint16_t *above, const uint16_t *row, const uint16_t *below,
+                            uint16_t *rgb)
 {
     bool is_red_row = (y & 1) == f->red_y;
-    for (int x = 0; x < width; x++) {
-        int left = mirror(x - 1, width), right = mirror(x + 1, width);
-        unsigned beside = (unsigned)row[left] + row[right];
+    int own = is_red_row ? 0 : 2; // the row's colour besides green
+    for (int x = 0; x < width; x++, rgb += 3) {
+        unsigned beside = (unsigned)row[x - 1] + row[x + 1];
         unsigned upright = (unsigned)above[x] + below[x];
-        unsigned rgb[3];
-        bool is_red_column = (x & 1) == f->red_x;
-        if (is_red_row == is_red_column) { // on red, or on blue
-            unsigned corners = (unsigned)above[left] + above[right] + below[left] + below[right];
-            rgb[is_red_row ? 0 : 2] = row[x];
-            rgb[1] = (beside + upright + 2) / 4;
-            rgb[is_red_row ? 2 : 0] = (corners + 2) / 4;
+        if (((x & 1) == f->red_x) == is_red_row) { // on red, or on blue
+            unsigned corners = (unsigned)above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1];
+            rgb[own] = row[x];
+            rgb[1] = (uint16_t)((beside + upright + 2) / 4);
+            rgb[2 - own] = (uint16_t)((corners + 2) / 4);
         } else {
-            rgb[is_red_row ? 0 : 2] = (beside + 1) / 2;
+            rgb[own] = (uint16_t)((beside + 1) / 2);
             rgb[1] = row[x];
-            rgb[is_red_row ? 2 : 0] = (upright + 1) / 2;
+            rgb[2 - own] = (uint16_t)((upright + 1) / 2);
         }
-        for (size_t c = 0; c < 3; c++)
-            write_code(w, out, 3 * ((size_t)y * (size_t)width + (size_t)x) + c, rgb[c]);
     }
+}
+
+/** Unpacks row y and mirrors its ends: without repeating them, so that colours keep their order. */
+static unsigned unpack_mosaic_row(const struct gn_pixels_format *f, const uint8_t *source, int y,
+                                  int width, uint16_t *row)
+{
+    unsigned all = unpack(f, source, (size_t)y * (size_t)width, (size_t)width, row);
+    row[-1] = row[1];
+    row[width] = row[width - 2];
+    return all;
 }
 
 /** Mosaics row by row: three rows of samples are at hand. Returns the bits that any has. */
 static unsigned convert_mosaic(const struct gn_pixels_format *f, const struct writer *w, int width,
-                               int height, const uint8_t *source, uint16_t *rows, void *out)
+                               int height, const uint8_t *source, uint16_t *scratch, void *out)
 {
-    unsigned all = 0;
     size_t n = (size_t)width;
-    uint16_t *row[3] = {rows, rows + n, rows + 2 * n};
-    all |= unpack(f, source, 0, n, row[0]);
-    all |= unpack(f, source, n, n, row[1]);
+    uint16_t *row[3] = {scratch + 1, scratch + n + 3, scratch + 2 * n + 5};
+    uint16_t *rgb = scratch + 3 * n + 6;
+    unsigned all = unpack_mosaic_row(f, source, 0, width, row[0]);
+    all |= unpack_mosaic_row(f, source, 1, width, row[1]);
     for (int y = 0; y < height; y++) {
         if (y > 0 && y + 1 < height)
-            all |= unpack(f, source, (size_t)(y + 1) * n, n, row[(y + 1) % 3]);
-        const uint16_t *above = row[mirror(y - 1, height) % 3];
-        interpolate_row(f, w, y, width, above, row[y % 3], row[mirror(y + 1, height) % 3], out);
+            all |= unpack_mosaic_row(f, source, y + 1, width, row[(y + 1) % 3]);
+        int above = y > 0 ? y - 1 : 1, below = y + 1 < height ? y + 1 : height - 2;
+        interpolate_row(f, y, width, row[above % 3], row[y % 3], row[below % 3], rgb);
+        write_codes(w, rgb, 3 * n, out, 3 * n * (size_t)y);
     }
     return all;
 }
@@ -175,19 +188,19 @@ static unsigned convert_rows(const struct gn_pixels_format *f, const struct writ
                              int height, const uint8_t *source, uint16_t *samples, void *out)
 {
     unsigned all = 0;
-    int n_channels = count_channels(f);
-    size_t n = (size_t)width * (size_t)n_channels;
+    size_t n = (size_t)width * (size_t)count_channels(f);
     bool is_widened = f->kind == GN_PIXELS_MONO && w->is_8_bit; // gray to R, G, B
     for (size_t y = 0; y < (size_t)height; y++) {
         all |= unpack(f, source, y * n, n, samples);
-        for (size_t i = 0; i < n && !is_widened; i++) {
-            size_t from = f->kind == GN_PIXELS_BGR ? i - i % 3 + (2 - i % 3) : i;
-            write_code(w, out, y * n + i, samples[from]);
+        for (size_t i = 0; i < n && f->kind == GN_PIXELS_BGR; i += 3) {
+            uint16_t blue = samples[i];
+            samples[i] = samples[i + 2];
+            samples[i + 2] = blue;
         }
-        for (size_t i = 0; i < n && is_widened; i++) {
-            unsigned code = scale_code(w, samples[i]);
-            memset((uint8_t *)out + 3 * (y * n + i), (int)code, 3);
-        }
+        for (size_t i = n;
+             i-- > 0 && is_widened;) // from the end: each is read before it is written
+            samples[3 * i] = samples[3 * i + 1] = samples[3 * i + 2] = samples[i];
+        write_codes(w, samples, is_widened ? 3 * n : n, out, (is_widened ? 3 * n : n) * y);
     }
     return all;
 }
@@ -219,9 +232,11 @@ int gn_pixels_convert(const struct gn_pixels_format *format, bool is_8_bit, int 
                                                                             : 65535,
         .is_8_bit = capture == GN_CAPTURE_RGB8,
     };
-    uint16_t rows[3 * 1024], *samples = rows;
-    if (3 * row_samples > sizeof(rows) / sizeof(rows[0]))
-        samples = malloc(3 * row_samples * sizeof(*samples));
+    // Three rows of a mosaic, with ends, and one of R, G, B.
+    size_t n_scratch = 6 * (size_t)width + 6;
+    uint16_t rows[8 * 1024], *samples = rows;
+    if (n_scratch > GN_ARRAY_LEN(rows))
+        samples = malloc(n_scratch * sizeof(*samples));
     if (!samples)
         return -ENOMEM;
     if (format->kind == GN_PIXELS_BAYER)
