@@ -5,37 +5,19 @@ and by gnomon probe and view, against a real gnomond.
 
 usage: gige.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON FAKE_GIGE GIGE_TOOL
 """
-import fcntl
 import json
 import os
 import re
 import shutil
 import signal
-import socket
-import struct
 import subprocess
 import sys
 import tempfile
 import time
 
-
-def enter_network():
-    """Runs this script again in a network of its own, where nobody else has cameras."""
-    for how in (['unshare', '--net'], ['unshare', '--user', '--map-root-user', '--net']):
-        if subprocess.run(how + ['true'], stderr=subprocess.DEVNULL).returncode == 0:
-            os.environ['GN_OWN_NETWORK'] = '1'
-            os.execvp(how[0], how + [sys.executable] + sys.argv)
-    print('1..0 # SKIP no network namespace may be made here (unshare --net)')
-    sys.exit(0)
-
-
-if 'GN_OWN_NETWORK' not in os.environ:
-    enter_network()
-SIOCSIFFLAGS, IFF_UP, IFF_RUNNING = 0x8914, 0x1, 0x40
-with socket.socket() as loopback:
-    fcntl.ioctl(loopback, SIOCSIFFLAGS, struct.pack('16sH14x', b'lo', IFF_UP | IFF_RUNNING))
-
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.insert(0, sys.argv[2])
+import own_network  # noqa: E402
 from gnomond import Daemon, run_tests  # noqa: E402
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
 
@@ -182,7 +164,7 @@ def read_number(path):
 
 def test_ordinary_user():
     """Without the right to raw sockets: the socket's buffer must hold a picture's packets."""
-    drop = ['setpriv', '--bounding-set', '-all', '--inh-caps', '-all']
+    drop = own_network.NO_RIGHTS
     nobody = drop + ['--reuid', '65534', '--regid', '65534', '--clear-groups']
     if subprocess.run(nobody + ['test', '-x', TOOL], stderr=subprocess.DEVNULL).returncode == 0:
         drop = nobody
@@ -314,5 +296,6 @@ def test_settings():
         assert 'no GigE Vision camera answers in the networks' in err, err
 
 
+own_network.enter()
 run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_restart, test_view,
            test_controller, test_hostile, test_settings])

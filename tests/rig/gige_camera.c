@@ -52,7 +52,7 @@ static const struct gn_option option_table[] = {
      .flag = "address",
      .type = GN_OPTION_STRING,
      .default_value = "127.0.0.1",
-     .help = "Where it is found."},
+     .help = "Where it is found; at another than the default only by that address."},
     {.key = "serial",
      .flag = "serial",
      .type = GN_OPTION_STRING,
@@ -472,7 +472,10 @@ static int open_sockets(struct camera *c, const char *address, struct gn_error *
     int one = 1, size = 8 << 20;
     if (inet_pton(AF_INET, address, &at.sin_addr) != 1)
         return gn_error_set(error, -EINVAL, "--address %s: no IPv4 address", address);
-    any.sin_port = htons(GVCP_PORT); // all addresses: discovery is a broadcast
+    // Discovery is a broadcast, so the first camera listens at all addresses; more do at their own.
+    if (at.sin_addr.s_addr != htonl(INADDR_LOOPBACK))
+        any.sin_addr = at.sin_addr;
+    any.sin_port = htons(GVCP_PORT);
     c->control = socket(AF_INET, SOCK_DGRAM, 0);
     c->stream = socket(AF_INET, SOCK_DGRAM, 0);
     setsockopt(c->control, SOL_SOCKET, SO_REUSEADDR, &one, sizeof(one));
