@@ -89,8 +89,8 @@ static const struct gn_program program = {
     .summary = "Measures a camera's lens from 10 to 20 pictures of a flat board, tilted 20 to 45 "
                "degrees in all ways, near enough that it reaches the picture's corners in some.",
     .notes = "Example:\n"
-             "  gnomon calibrate intrinsics --files 'shots/*.png' --board 10x7 --out camera.json "
-             "\\\n      --picture coverage.png\n",
+             "  gnomon calibrate intrinsics --files 'shots/*.png' --board 10x7 \\\n"
+             "      --out camera.json --picture coverage.png\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };

@@ -123,10 +123,10 @@ static const struct gn_program program = {
     .summary = "Measures a light probe: a fisheye's circle, lens and orientation against the "
                "marker, or a mirror ball's place in its picture.",
     .notes = "Examples:\n"
-             "  gnomon calibrate probe --files 'lamp-*.png' --projection fisheye-equidistant \\\n"
-             "      --find-circle --lamps lamps.txt --out probe.json\n"
-             "  gnomon calibrate probe --files ball.png --projection mirrorball --ball 320,240,150 "
-             "\\\n      --out probe.json --picture ball-found.png\n",
+             "  gnomon calibrate probe --files 'lamp*.png' --find-circle \\\n"
+             "      --projection fisheye-equidistant --lamps lamps.txt --out probe.json\n"
+             "  gnomon calibrate probe --files ball.png --projection mirrorball \\\n"
+             "      --ball 320,240,150 --out probe.json --picture ball-found.png\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };

@@ -112,10 +112,10 @@ static const struct gn_program program = {
     .summary = "Measures what light the codes of a camera or probe stand for. Lock its exposure, "
                "gain and white balance first.",
     .notes = "Examples:\n"
-             "  gnomon calibrate response --chart 'shots/*.png' --full-scale 4095 --out probe.json "
-             "\\\n      --plot residuals.svg\n"
-             "  gnomon calibrate response --stack 'stack/*.jpg' --times 1/60,1/30,1/15,1/8,1/4 "
-             "\\\n      --out camera.json\n",
+             "  gnomon calibrate response --chart 'shots/*.png' --full-scale 4095 \\\n"
+             "      --out probe.json --plot residuals.svg\n"
+             "  gnomon calibrate response --stack 'stack/*.jpg' \\\n"
+             "      --times 1/60,1/30,1/15,1/8,1/4 --out probe.json\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };

@@ -210,7 +210,7 @@ double gn_chart_orient(const struct gn_image *image, struct gn_chart_place *plac
         if (gn_chart_measure(image, &tried, 0, measured, NULL) < 0)
             return -1;
         for (int j = 0; j < 24; j++)
-            code[j] = measured[j].code[0] + measured[j].code[1] + measured[j].code[2];
+            code[j] = measured[j].code[1]; // ranks: any response that rises keeps them
         double correlation = correlate_ranks(code, expected);
         if (correlation > best) {
             best = correlation;

@@ -55,7 +55,7 @@ GN_MUST_USE int gn_chart_measure(const struct gn_image *image, const struct gn_c
 
 /**
  * Which of the chart's four ways to lie (turned by 180 degrees, mirrored) fits what was measured
- * best, by the rank correlation of codes and luminance; *place becomes that. Returns the
+ * best, by the rank correlation of green codes and luminance; *place becomes that. Returns the
  * correlation, 1 at best; below 0.8 it is no such chart.
  */
 double gn_chart_orient(const struct gn_image *image, struct gn_chart_place *place);

@@ -187,7 +187,8 @@ static int judge(const struct fit *f, struct scratch *w, struct gn_fisheye_sight
     double norm[MAX_PARAMETERS] = {0}, sum = 0;
     *out = (struct gn_fisheye_fit){.projection = f->projection, .world_from_probe = f->pose};
     if (!get_residuals(f, zero, w->residual) || !differentiate(f, w->jacobian, w->plus, w->minus))
-        return gn_error_set(out_error, -EDOM, "these lamps do not determine the lens, which the fit made one that "
+        return gn_error_set(out_error, -EDOM,
+                            "these lamps do not determine the lens, which the fit made one that "
                             "cannot be: take lamps near the middle and near the rim");
     for (int i = 0; i < f->n; i++) {
         s[i].error_deg = DEGREE * hypot(w->residual[2 * i], w->residual[2 * i + 1]);

@@ -65,17 +65,18 @@ static void insert(struct gn_spot *spots, int *n, int max, const struct gn_spot 
 
 int gn_spots_find(const struct gn_image *light, double share, int max, struct gn_spot *out_spots)
 {
-    int pixels = light->width * light->height, n = 0;
+    size_t pixels = (size_t)light->width * (size_t)light->height;
+    int n = 0;
     double largest = 0;
-    for (int i = 0; i < pixels; i++)
-        largest = fmax(largest, get(light, i % light->width, i / light->width));
-    uint8_t *seen = calloc((size_t)pixels, 1);
-    int *stack = malloc((size_t)pixels * sizeof(*stack));
-    for (int i = 0; seen && stack && largest > 0 && i < pixels; i++) {
-        if (seen[i] || !(get(light, i % light->width, i / light->width) > share * largest))
+    for (size_t i = 0; i < pixels; i++)
+        largest = isfinite(light->data[i]) ? fmax(largest, (double)light->data[i]) : largest;
+    uint8_t *seen = calloc(pixels, 1);
+    int *stack = malloc(pixels * sizeof(*stack));
+    for (size_t i = 0; seen && stack && largest > 0 && i < pixels; i++) {
+        if (seen[i] || !isfinite(light->data[i]) || !((double)light->data[i] > share * largest))
             continue;
-        struct gn_spot spot = flood(light, share * largest, i, seen, stack);
-        if (spot.n_pixels <= pixels / 10 && spot.light > 0)
+        struct gn_spot spot = flood(light, share * largest, (int)i, seen, stack);
+        if ((size_t)spot.n_pixels <= pixels / 10 && spot.light > 0)
             insert(out_spots, &n, max, &spot);
     }
     bool has_memory = seen && stack;

@@ -73,10 +73,11 @@ int find_board(const gn_board &board, const cv::Mat &grey, gn_board_corner *out,
     std::vector<cv::Point2f> corners =
         board.is_charuco ? find_charuco(board, grey, ids) : find_chessboard(board, grey);
     int columns = board.columns - 1;
+    // OpenCV's pixel centres are whole numbers, but not where it interpolates ChArUco corners.
+    double half = board.is_charuco ? 0 : 0.5;
     for (size_t i = 0; i < corners.size(); i++) {
         int id = board.is_charuco ? ids[i] : (int)i;
-        // OpenCV's pixel centres are whole numbers.
-        out[i] = {id % columns, id / columns, {corners[i].x + 0.5, corners[i].y + 0.5}};
+        out[i] = {id % columns, id / columns, {corners[i].x + half, corners[i].y + half}};
     }
     *out_n = (int)corners.size();
     return 0;

@@ -24,6 +24,13 @@ OPTIONS = [
     ([GNOMON, 'replay'], CONNECT | {'info', 'streams', 'rate-factor', 'as-fast-as-possible',
                                     'open-loop', 'pin-light', 'loop', 'out', 'expect-equal'}),
     ([GNOMON, 'doctor'], SERVER),
+    ([GNOMON, 'calibrate', 'intrinsics'], {'files', 'board', 'square', 'charuco', 'marker', 'square-pixels',
+                                           'max-error', 'out', 'picture'}),
+    ([GNOMON, 'calibrate', 'response'], {'chart', 'stack', 'times', 'model', 'method', 'as', 'corners', 'out',
+                                         'full-scale', 'bayer', 'matrix', 'plot', 'radiance'}),
+    ([GNOMON, 'calibrate', 'probe'], {'files', 'out', 'projection', 'theta-max', 'find-circle', 'ball',
+                                      'camera-share', 'lamps', 'fit', 'share', 'tolerance', 'full-scale',
+                                      'picture'}),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
     ([RENDER], {'scene', 'env', 'env-projection', 'env-params', 'world-from-env', 'camera',
                 'background', 'quality', 'budget-ms', 'lights', 'light-method', 'bounces',
@@ -70,7 +77,7 @@ def check_program():
     """gnomon itself: each command once, with a summary."""
     text = ask(GNOMON, '--help')
     check_shape(text)
-    for command in ('probe', 'screen', 'track', 'view', 'doctor'):
+    for command in ('probe', 'screen', 'track', 'view', 'calibrate', 'doctor'):
         assert len(re.findall(r'^  %s +\S' % command, text, re.M)) == 1, text
     assert ask(GNOMON, 'help') == ask(GNOMON, '-h') == text
     assert re.fullmatch(r'gnomon \d+\.\d+\.\d+\n', ask(GNOMON, '--version'))
