@@ -44,7 +44,8 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon probe",
-    .usage = "--sequence DIR | --files PATTERN | --gige ID | --v4l2 DEVICE [OPTION]...",
+    .usage = "--sequence DIR | --files PATTERN | --video FILE | --gige ID | --v4l2 DEVICE "
+             "[OPTION]...",
     .summary =
         "Streams environment frames to a room: what a camera behind a fisheye or in front of "
         "a mirror ball sees of the light. The server makes the room's lighting state of the "
@@ -109,12 +110,13 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_setup = gn_options_is_set(options, NULL, NULL, "setup");
     bool has_projection = gn_options_is_set(options, NULL, NULL, "projection");
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
+    bool has_video = gn_options_is_set(options, NULL, NULL, "video");
     const char *misuse = gn_feed_find_misuse(options);
     if (misuse)
         return misuse;
-    if (has_dir + has_files + gn_live_count_asked(options) != 1)
-        return "give --sequence DIR, --files PATTERN or a camera (--gige ID, --v4l2 DEVICE), one "
-               "of them";
+    if (has_dir + has_files + has_video + gn_live_count_asked(options) != 1)
+        return "give --sequence DIR, --files PATTERN, --video FILE or a camera (--gige ID, --v4l2 "
+               "DEVICE), one of them";
     if (has_dir + has_setup + has_projection > 1)
         return "the setup comes from --sequence, --setup or --projection, one of them";
     return NULL;
@@ -267,7 +269,7 @@ static int add_table(struct probe *p, struct pixels *pixels, struct gn_error *ou
     return 0;
 }
 
-/** Opens what --sequence or --files names, with its setup. */
+/** Opens what --sequence, --files, --video or a camera's option names, with its setup. */
 static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
@@ -292,7 +294,7 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
             err = gn_probe_setup_read_file(setup_path, setup, out_error);
         else if (projection)
             err = gn_projection_from_name(projection, &setup->projection.type);
-        if (!err && !is_live)
+        if (!err && pattern)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
     }
     gn_sequence_finish(&sequence);
@@ -304,6 +306,8 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
                                            .height = setup->projection.height};
     if (!err && is_live)
         err = gn_live_open(options, &wanted, &r->source, out_error);
+    else if (!err && gn_options_is_set(options, NULL, NULL, "video"))
+        err = gn_feed_open_video(r, options, true, out_error);
     else if (!err)
         err = gn_feed_open_files(r, &list, &source_options, out_error);
     gn_file_list_finish(&list);

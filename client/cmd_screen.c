@@ -24,7 +24,6 @@ static const struct gn_option option_table[] = {
      .flag = "files",
      .type = GN_OPTION_STRING,
      .value_name = "PATTERN",
-     .is_required = true,
      .help = "What it shows: a picture, a folder's pictures, or a pattern in quotes such as "
              "'film/*.jpg', in the order of their names. PNG of 8 bits and JPEG are sRGB, EXR and "
              "Radiance linear; up to 2048 pixels a side."},
@@ -36,16 +35,18 @@ static const struct gn_option option_table[] = {
      .default_value = "1",
      .value_name = "X",
      .help = "How bright: factor on the linear picture and the scene's emission_scale."},
-    GN_FEED_PACE_OPTIONS("Without it they go at 10."),
+    GN_FEED_VIDEO_OPTION,
+    GN_FEED_PACE_OPTIONS("Without it files go at 10, a video keeps its own times."),
 };
 
 static const struct gn_program program = {
     .name = "gnomon screen",
-    .usage = "--stream NAME --files PATTERN [OPTION]...",
+    .usage = "--stream NAME --files PATTERN|--video FILE [OPTION]...",
     .summary = "Streams pictures onto an emitter of the room's scene: a TV or a video wall that "
                "lights what is near it. The last picture stays when this ends.",
     .notes = "Examples:\n"
              "  gnomon screen --stream tv --files film --loop --rate 25\n"
+             "  gnomon screen --stream tv --video film.mp4 --loop\n"
              "  gnomon screen --stream tv --files black.png --count 1\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
@@ -131,6 +132,9 @@ static const char *find_misuse(const struct gn_options *options)
     const char *name = gn_options_get_string(options, NULL, NULL, "stream");
     if (strlen(name) >= sizeof((struct gn_msg_emitter_frame){0}.stream))
         return "--stream: names have at most 63 bytes";
+    if (gn_options_is_set(options, NULL, NULL, "files") ==
+        gn_options_is_set(options, NULL, NULL, "video"))
+        return "give --files PATTERN or --video FILE, one of them";
     return NULL;
 }
 
@@ -143,6 +147,8 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
     s->scale = gn_options_get_double(options, NULL, NULL, "scale");
     gn_wire_set_string(s->frame.stream, sizeof(s->frame.stream),
                        gn_options_get_string(options, NULL, NULL, "stream"));
+    if (gn_options_is_set(options, NULL, NULL, "video"))
+        return gn_feed_open_video(r, options, false, out_error);
     int err = gn_file_list_find(gn_options_get_string(options, NULL, NULL, "files"), r->rate_hz,
                                 &list, out_error);
     if (!err)

@@ -106,7 +106,8 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon view",
-    .usage = "--sequence DIR | {--files PATTERN | --gige ID | --v4l2 DEVICE} --camera FILE, "
+    .usage = "--sequence DIR | {--files PATTERN | --video FILE | --gige ID | --v4l2 DEVICE} "
+             "--camera FILE, "
              "--out DIR | --window [OPTION]...",
     .summary = "Streams camera frames and poses to a room and writes the composited frames that "
                "come back, with their receipts. Every frame comes back exactly once, as a result "
@@ -125,6 +126,7 @@ static const char *find_misuse(const struct gn_options *options)
 {
     bool has_dir = gn_options_is_set(options, NULL, NULL, "sequence");
     bool has_files = gn_options_is_set(options, NULL, NULL, "files");
+    bool has_video = gn_options_is_set(options, NULL, NULL, "video");
     bool has_camera = gn_options_is_set(options, NULL, NULL, "camera");
     const char *misuse = gn_feed_find_misuse(options);
     if (misuse)
@@ -132,9 +134,10 @@ static const char *find_misuse(const struct gn_options *options)
     if (!gn_options_is_set(options, NULL, NULL, "out") &&
         !gn_options_get_bool(options, NULL, NULL, "window"))
         return "give --out DIR, for the composites, or --window";
-    if (has_dir + has_files + gn_live_count_asked(options) != 1 || has_dir == has_camera)
-        return "give --sequence DIR, or --files PATTERN or a camera (--gige ID, --v4l2 DEVICE) "
-               "with --camera FILE";
+    if (has_dir + has_files + has_video + gn_live_count_asked(options) != 1 ||
+        has_dir == has_camera)
+        return "give --sequence DIR, or --files PATTERN, --video FILE or a camera (--gige ID, "
+               "--v4l2 DEVICE) with --camera FILE";
     if (gn_options_get_double(options, NULL, NULL, "budget-ms") > 0 &&
         gn_options_get_enum(options, NULL, NULL, "quality") != 0)
         return "--budget-ms is for --quality interactive: the others' settings are not chosen";
@@ -274,7 +277,7 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
         memset(&sequence.pictures, 0, sizeof(sequence.pictures));
     } else {
         err = gn_camera_read_file(camera_path, &v->camera, out_error);
-        if (!err && !is_live)
+        if (!err && pattern)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
     }
     gn_match_keep(gn_options_get_set(options, NULL, NULL, "match"), &v->camera);
@@ -292,6 +295,8 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
         .is_8_bit = true, .width = v->camera.width, .height = v->camera.height};
     if (!err && is_live)
         return gn_live_open(options, &wanted, &r->source, out_error);
+    if (!err && gn_options_is_set(options, NULL, NULL, "video"))
+        return gn_feed_open_video(r, options, false, out_error);
     if (!err)
         err = gn_file_list_check_names(&list, out_error);
     if (!err)

@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <stdio.h>
 
+#include "client/capture/video.h"
 #include "common/clock.h"
 
 /** Lateness that is caught up. */
@@ -31,6 +32,14 @@ int gn_feed_open_files(struct gn_feed *r, struct gn_file_list *list,
     return gn_file_source_open(list, options, &r->source) < 0
                ? gn_error_set(out_error, -ENOMEM, "out of memory")
                : 0;
+}
+
+int gn_feed_open_video(struct gn_feed *r, const struct gn_options *options, bool keeps_bits,
+                       struct gn_error *out_error)
+{
+    const struct gn_video_options wanted = {.is_looped = r->is_looped, .keeps_bits = keeps_bits};
+    return gn_video_source_open(gn_options_get_string(options, NULL, NULL, "video"), &wanted,
+                                &r->source, out_error);
 }
 
 static void read_pace(struct gn_feed *r, const struct gn_options *options, bool has_times)
@@ -205,8 +214,10 @@ int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int ar
     r->program = command->program;
     r->link = (struct gn_cmd_link){
         .program = command->program, .options = options, .role = command->role};
-    read_pace(r, options,
-              command->takes_sequences && gn_options_is_set(options, NULL, NULL, "sequence"));
+    bool has_times =
+        gn_options_is_set(options, NULL, NULL, "video") ||
+        (command->takes_sequences && gn_options_is_set(options, NULL, NULL, "sequence"));
+    read_pace(r, options, has_times);
     if (misuse) {
         gn_cmd_fail(command->program, misuse);
         status = 2;

@@ -28,7 +28,16 @@
          .value_name = "PATTERN",                                                                  \
          .help = "Instead: a folder's pictures, or a pattern in quotes such as 'frames/*.png'; "   \
                  "EXR, Radiance, PNG or JPEG, in the order of their names."},                      \
-        GN_FEED_PACE_OPTIONS("Without it a sequence keeps its own times; files go at 10.")
+        GN_FEED_VIDEO_OPTION,                                                                      \
+        GN_FEED_PACE_OPTIONS("Without it a sequence and a video keep their own times; files go "   \
+                             "at 10.")
+
+/** Row of the option table that every command has that can stream a video file. */
+#define GN_FEED_VIDEO_OPTION                                                                       \
+    {                                                                                              \
+        .key = "video", .flag = "video", .type = GN_OPTION_STRING, .value_name = "FILE",           \
+        .help = "Instead: the pictures of a video file, such as MP4, Matroska, AVI or Y4M."        \
+    }
 
 /** Rows of the option table that every command that streams pictures has; default_rate: a sentence
  * that says at which rate where --rate is not given. */
@@ -109,6 +118,13 @@ int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int ar
 /** What is wrong with the options of GN_FEED_OPTIONS and GN_LIVE_OPTIONS together; NULL: nothing
  * but that there may be no source, or several. */
 const char *gn_feed_find_misuse(const struct gn_options *options);
+
+/**
+ * Opens what --video names. keeps_bits: more than 8 bits a channel stay as they are. Returns 0, or
+ * a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_feed_open_video(struct gn_feed *r, const struct gn_options *options,
+                                   bool keeps_bits, struct gn_error *out_error);
 
 /** Opens the files as the source. Returns 0, or -ENOMEM and a sentence. */
 GN_MUST_USE int gn_feed_open_files(struct gn_feed *r, struct gn_file_list *list,

@@ -11,7 +11,7 @@ import sys
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 SERVER = {'server', 'room', 'token'}
 CONNECT = SERVER | {'record', 'record-max'}
-FEED = {'sequence', 'files', 'rate', 'start-at', 'loop', 'count'}
+FEED = {'sequence', 'files', 'video', 'rate', 'start-at', 'loop', 'count'}
 LIVE = {'gige', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
