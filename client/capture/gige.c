@@ -125,8 +125,8 @@ static int64_t get_time_ns(struct gige *s, ArvBuffer *buffer)
     int64_t age_ns = gn_clock_get_realtime_ns() - (int64_t)arv_buffer_get_system_timestamp(buffer);
     if (age_ns < 0 || age_ns > GN_NS_PER_S) // the wall clock was set meanwhile
         age_ns = 0;
-    int64_t time_ns =
-        gn_device_clock_map(&s->clock, arv_buffer_get_timestamp(buffer), now_ns - age_ns);
+    int64_t time_ns = gn_device_clock_map(&s->clock, gn_gige_device_get_stamp(&s->device, buffer),
+                                          now_ns - age_ns);
     return time_ns - (int64_t)(s->device.exposure_us * 500);
 }
 

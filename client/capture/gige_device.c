@@ -258,6 +258,39 @@ static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *pl
     return 0;
 }
 
+/** Asks for a stamp behind each picture, of cameras that can: some leave the leader's empty. */
+static void set_chunks(struct gn_gige_device *d)
+{
+    GError *error = NULL;
+    if (!arv_camera_are_chunks_available(d->camera, NULL))
+        return;
+    arv_camera_set_chunks(d->camera, "Timestamp", &error);
+    guint64 ticks_per_s = arv_gv_device_get_timestamp_tick_frequency(
+        ARV_GV_DEVICE(arv_camera_get_device(d->camera)), NULL);
+    d->ns_per_tick = ticks_per_s > 0 ? 1e9 / (double)ticks_per_s : 1;
+    if (!error)
+        d->chunks = arv_camera_create_chunk_parser(d->camera);
+    else
+        arv_camera_set_chunk_mode(d->camera, FALSE, NULL);
+    g_clear_error(&error);
+}
+
+uint64_t gn_gige_device_get_stamp(const struct gn_gige_device *device, ArvBuffer *buffer)
+{
+    GError *error = NULL;
+    if (!device->chunks || !arv_buffer_has_chunks(buffer))
+        return arv_buffer_get_timestamp(buffer);
+    gint64 ticks =
+        arv_chunk_parser_get_integer_value(device->chunks, buffer, "ChunkTimestamp", &error);
+    bool is_good = !error && ticks > 0;
+    g_clear_error(&error);
+    if (!is_good)
+        return arv_buffer_get_timestamp(buffer);
+    // A clock of 1 GHz, the usual one, needs no rounding.
+    double ns = (double)ticks * device->ns_per_tick;
+    return device->ns_per_tick == 1 ? (uint64_t)ticks : ns < 9e18 ? (uint64_t)ns : 0;
+}
+
 static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *place,
                         struct gn_error *out_error)
 {
@@ -303,8 +336,10 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
         err = set_size(&d, place, options, out_error);
     if (!err)
         err = set_exposure(&d, place, options, out_error);
-    if (!err)
+    if (!err) {
+        set_chunks(&d);
         err = start_stream(&d, place, out_error);
+    }
     if (!err) {
         ArvGvDevice *gv = ARV_GV_DEVICE(device);
         copy_address(arv_gv_device_get_device_address(gv), place->address, sizeof(place->address));
@@ -322,6 +357,7 @@ void gn_gige_device_close(struct gn_gige_device *device)
 {
     if (device->camera && device->stream)
         arv_camera_stop_acquisition(device->camera, NULL);
+    g_clear_object(&device->chunks);
     g_clear_object(&device->stream);
     g_clear_object(&device->camera);
 }

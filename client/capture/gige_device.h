@@ -15,6 +15,8 @@
 #include "common/error.h"
 #include "proto/attr.h"
 
+struct _ArvBuffer; // ArvBuffer
+
 /** Where a camera was found. */
 struct gn_gige_place {
     char id[128];       // Aravis' name of it: maker-serial number
@@ -24,8 +26,10 @@ struct gn_gige_place {
 
 /** Values. The objects are owned; all NULL: not open. */
 struct gn_gige_device {
-    struct _ArvCamera *camera; // ArvCamera
-    struct _ArvStream *stream; // ArvStream
+    struct _ArvCamera *camera;      // ArvCamera
+    struct _ArvStream *stream;      // ArvStream
+    struct _ArvChunkParser *chunks; // ArvChunkParser; NULL: it sends no stamps in chunks
+    double ns_per_tick;             // of the stamps in chunks
     const struct gn_pixels_format *format;
     int width, height;
     size_t picture_bytes; // of one picture as the camera sends it
@@ -48,6 +52,10 @@ bool gn_gige_place_answers(const struct gn_gige_place *place);
 GN_MUST_USE int gn_gige_device_open(struct gn_gige_place *place,
                                     const struct gn_live_options *options, int patience_ms,
                                     struct gn_gige_device *out_device, struct gn_error *out_error);
+
+/** When the camera says that it took a picture, its own clock, ns: the stamp in the picture's
+ * chunk, else that of its leader; 0: it does not say. */
+uint64_t gn_gige_device_get_stamp(const struct gn_gige_device *device, struct _ArvBuffer *buffer);
 
 /** Ends the stream and gives the camera up; takes seconds where it does not answer any more. */
 void gn_gige_device_close(struct gn_gige_device *device);

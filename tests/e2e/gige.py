@@ -185,6 +185,15 @@ def test_loss():
     assert got['incomplete'] > 0 and got['lost_packets'] > 0 and got['resent'] == 0, got
 
 
+def test_times():
+    """A picture's time is when it was taken, by the camera's stamp, however late it left."""
+    for more in ([], ['--chunks']):
+        with Camera(*size(), '--delay-ms', '12', *more):
+            got = read_pictures('127.0.0.1', 'Mono12', 40, rate=50)
+        # By their arrival they would be some ms off the camera's beat.
+        assert got['off_ms'] < 0.3, (more, got)
+
+
 def test_restart():
     """The camera is killed and comes back: pictures within 2 s, and nobody else notices."""
     with Daemon() as daemon, Folder() as folder:
@@ -213,9 +222,11 @@ def test_restart():
             assert gap_s < 2, 'pictures came %.2f s after the camera' % gap_s
             lamp.wait_for('environment frame')
             out, err = lamp.interrupt()
-        assert 'opened again 1 times' in out, out
+        assert re.search('opened again [1-9]', out), out
+        # Each is said once; a machine that stood still for seconds may have lost it more often.
         lines = err.splitlines()
-        assert len(lines) == 2 and 'lost' in lines[0] and lines[1].endswith('back'), err
+        assert len(lines) % 2 == 0 and all(': lost: ' in line for line in lines[::2]), err
+        assert all(line.endswith(': back') for line in lines[1::2]), err
         _, err = viewer.interrupt()
         assert err == '', err
         with open(folder.at('out/view.json')) as f:
@@ -297,5 +308,5 @@ def test_settings():
 
 
 own_network.enter()
-run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_restart, test_view,
-           test_controller, test_hostile, test_settings])
+run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_times, test_restart,
+           test_view, test_controller, test_hostile, test_settings])

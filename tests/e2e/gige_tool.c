@@ -7,6 +7,7 @@
  */
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,7 @@
 #include "client/capture/gige.h"
 #include "client/capture/pixels.h"
 #include "common/clock.h"
+#include "proto/attr.h"
 #include "tests/rig/gige_picture.h"
 
 #define SILENCE_NS (20 * GN_NS_PER_S)
@@ -97,6 +99,18 @@ static double get_cpu_ms(void)
            (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec) * 1e-3;
 }
 
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double get_median(double *values, size_t n)
+{
+    qsort(values, n, sizeof(*values), compare);
+    return values[n / 2];
+}
+
 int main(int argc, char *argv[])
 {
     if (argc != 8)
@@ -111,6 +125,7 @@ int main(int argc, char *argv[])
     struct gn_error error = {0};
     struct expected expected = {0};
     long n_wanted = atol(argv[6]), n = 0, n_wrong = 0;
+    static double off_ms[100000]; // by how much steps between pictures are no whole frame times
     double age_max_ms = 0, age_min_ms = 1e9, age_sum_ms = 0, step_max_ms = 0;
     int64_t last_ns = 0, gap_ns = 0;
     uint64_t next = 0;
@@ -143,6 +158,10 @@ int main(int argc, char *argv[])
             n_wrong += capture.time_ns <= last_ns;
             if (last_ns && now_ns - heard_ns > gap_ns)
                 gap_ns = now_ns - heard_ns;
+            if (n > 0 && n < (long)GN_ARRAY_LEN(off_ms) && options.frame_rate_hz > 0) {
+                double steps = (double)(capture.time_ns - last_ns) * 1e-9 * options.frame_rate_hz;
+                off_ms[n - 1] = fabs(steps - round(steps)) * 1e3 / options.frame_rate_hz;
+            }
             last_ns = capture.time_ns;
             heard_ns = now_ns;
             if (n++ == 0)
@@ -159,12 +178,12 @@ int main(int argc, char *argv[])
     printf("{\"pictures\": %ld, \"wrong\": %ld, \"complete\": %" PRIu64 ", \"incomplete\": %" PRIu64
            ", \"skipped\": %" PRIu64 ", \"lost_packets\": %" PRIu64 ", \"resent\": %" PRIu64
            ", \"reopened\": %" PRIu64 ", \"copies\": %.3f, \"age_ms\": [%.2f, %.2f, %.2f], "
-           "\"gap_ms\": %.1f, \"first_ms\": %.1f, \"cpu_ms\": %.3f}\n",
+           "\"gap_ms\": %.1f, \"first_ms\": %.1f, \"cpu_ms\": %.3f, \"off_ms\": %.3f}\n",
            n, n_wrong, c.n_complete, c.n_incomplete, c.n_skipped, c.n_lost_packets,
            c.n_resent_packets, c.n_reopened,
            c.read_bytes ? (double)c.copied_bytes / (double)c.read_bytes : 0, age_min_ms,
            n ? age_sum_ms / (double)n : 0, age_max_ms, (double)gap_ns * 1e-6, step_max_ms,
-           n ? cpu_ms / (double)n : 0);
+           n ? cpu_ms / (double)n : 0, n > 1 ? get_median(off_ms, (size_t)n - 1) : 0);
     gn_source_close(&source);
     free(expected.native);
     free(expected.bytes);

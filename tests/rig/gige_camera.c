@@ -25,6 +25,7 @@
 #include "common/image_file.h"
 #include "common/options.h"
 #include "proto/attr.h"
+#include "tests/rig/gige_genicam.h"
 #include "tests/rig/gige_picture.h"
 
 #define GVCP_PORT 3956
@@ -102,6 +103,19 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_BOOL,
      .default_value = "false",
      .help = "Do not send packets again, and say so."},
+    {.key = "chunks",
+     .flag = "chunks",
+     .type = GN_OPTION_BOOL,
+     .default_value = "false",
+     .help = "Stamp pictures in a chunk behind them, where the client asks for it, and nowhere "
+             "else."},
+    {.key = "delay-ms",
+     .flag = "delay-ms",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0,
+     .max = 1000,
+     .default_value = "0",
+     .help = "Pictures leave up to so much after they were taken, at random."},
     {.key = "fault",
      .flag = "fault",
      .type = GN_OPTION_ENUM,
@@ -127,14 +141,15 @@ struct frame {
     uint64_t time_ns;
     size_t n_bytes, n_sent; // of the picture; what of it is ever sent
     size_t chunk;           // of it in a packet
+    bool has_chunks;        // a stamp follows the picture
     uint8_t *data;
 };
 
 struct camera {
     ArvFakeCamera *fake;
     enum fault fault;
-    double loss, step_s;
-    bool can_resend;
+    double loss, step_s, delay_ms;
+    bool can_resend, has_chunks;
     int n_files;
     struct gn_image16 *files;
     int control, stream; // sockets
@@ -190,7 +205,7 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
     put16(bytes + 2, f->id);
     if (packet == 0) {
         put32(bytes + 4, 1u << 24);
-        put16(bytes + 10, 1); // payload type: image
+        put16(bytes + 10, f->has_chunks ? 0x4001 : 1); // payload type: image, and chunks
         put32(bytes + 12, (uint32_t)(f->time_ns >> 32));
         put32(bytes + 16, (uint32_t)f->time_ns);
         put32(bytes + 20, f->format);
@@ -224,6 +239,18 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
 
 static void answer_waiting(struct camera *c, int timeout_ms);
 
+/** What follows a picture of n bytes: each chunk's data, its id, its length; the picture's first.
+ */
+static void put_chunks(uint8_t *out, uint32_t n, uint64_t time_ns)
+{
+    put32(out, 1);
+    put32(out + 4, n);
+    put32(out + 8, (uint32_t)(time_ns >> 32));
+    put32(out + 12, (uint32_t)time_ns);
+    put32(out + 16, GN_GIGE_CHUNK_ID);
+    put32(out + 20, 8);
+}
+
 /** Takes the picture and sends it. */
 static void send_frame(struct camera *c)
 {
@@ -233,26 +260,35 @@ static void send_frame(struct camera *c)
     const struct gn_pixels_format *format = gn_pixels_find(code);
     size_t n_bytes = format ? gn_pixels_get_bytes(format, width, height) : 0;
     struct frame *f = &c->kept[c->n_frames % N_KEPT];
+    // Taken when it was due, by a clock of the camera's own: from another zero, 20 ppm fast.
+    uint64_t time_ns = (uint64_t)((double)c->next_ns * 1.00002) + 7;
+    bool has_chunks = c->has_chunks && read_register(c, GN_GIGE_REG_CHUNK_MODE) &&
+                      read_register(c, GN_GIGE_REG_CHUNK_ENABLE);
+    size_t n_extra = has_chunks ? GN_GIGE_CHUNK_BYTES : 0;
     free(f->data);
     *f = (struct frame){.id = (uint16_t)(c->n_frames % 65535 + 1),
                         .format = c->fault == FAULT_FORMAT ? 0x01080002 : code,
                         .width = (uint32_t)width / (c->fault == FAULT_SIZE ? 2 : 1),
                         .height = (uint32_t)height,
-                        // A clock of its own: from another zero, 20 ppm fast.
-                        .time_ns = (uint64_t)((double)gn_clock_get_monotonic_ns() * 1.00002) + 7,
-                        .n_bytes = n_bytes,
+                        .time_ns = c->has_chunks ? 0 : time_ns,
+                        .n_bytes = n_bytes + n_extra,
                         .chunk = (read_register(c, REG_PACKET_SIZE) & 0xffff) - OVERHEAD,
-                        .data = calloc(1, n_bytes ? n_bytes : 1)};
+                        .has_chunks = has_chunks,
+                        .data = calloc(1, n_bytes + n_extra + 1)};
     if (!f->data || n_bytes == 0)
         return;
     double now_s = (double)(gn_clock_get_monotonic_ns() - c->begin_ns) * 1e-9;
     uint64_t k = c->step_s > 0 ? (uint64_t)(now_s / c->step_s) : c->n_frames;
     const struct gn_image16 *picture = c->n_files ? &c->files[k % (uint64_t)c->n_files] : NULL;
     gn_gige_pack(format, picture, c->n_frames, width, height, f->data);
+    if (has_chunks)
+        put_chunks(f->data + n_bytes, (uint32_t)n_bytes, time_ns);
     if (c->fault == FAULT_CODES)
         f->data[n_bytes - 1] = 0xff;
-    f->n_sent = c->fault == FAULT_TRUNCATED ? n_bytes / 2 : n_bytes;
-    uint32_t n_blocks = (uint32_t)((n_bytes + f->chunk - 1) / f->chunk);
+    f->n_sent = c->fault == FAULT_TRUNCATED ? f->n_bytes / 2 : f->n_bytes;
+    if (c->delay_ms > 0)
+        g_usleep((gulong)(drand48() * c->delay_ms * 1e3));
+    uint32_t n_blocks = (uint32_t)((f->n_bytes + f->chunk - 1) / f->chunk);
     for (uint32_t i = 0; i <= n_blocks + 1; i++) {
         send_packet(c, f, i, false);
         if (i % 64 == 63)
@@ -400,37 +436,6 @@ static void run(struct camera *c)
            (unsigned long long)c->n_frames, c->n_packets, c->n_dropped, c->n_asked, c->n_resent);
 }
 
-/** Aravis' GenICam file with the formats that it leaves out; the file's name, static. */
-static const char *write_genicam(void)
-{
-    static char path[64];
-    ArvFakeCamera *plain = arv_fake_camera_new("GN");
-    size_t size = 0;
-    const char *xml = arv_fake_camera_get_genicam_xml(plain, &size);
-    GString *text = g_string_new_len(xml, (gssize)size), *entries = g_string_new("");
-    static const uint32_t codes[] = {0x01100003, 0x010C0004, 0x010A0046, 0x01100005, 0x010C0006,
-                                     0x010C0047, 0x01100025, 0x0110000D, 0x010C0027, 0x010A0058,
-                                     0x01100011, 0x010C002B, 0x010C0059, 0x0110002F, 0x02180015,
-                                     0x0230001A, 0x0230001B, 0x02300033};
-    for (size_t i = 0; i < GN_ARRAY_LEN(codes); i++)
-        g_string_append_printf(entries,
-                               "<EnumEntry Name=\"%s\" NameSpace=\"Standard\"><Value>%u</Value>"
-                               "</EnumEntry>",
-                               gn_pixels_find(codes[i])->name, codes[i]);
-    const char *at = strstr(text->str, "<pValue>PixelFormatRegister</pValue>");
-    if (at)
-        g_string_insert(text, at - text->str, entries->str);
-    snprintf(path, sizeof(path), "/tmp/gnomon-fake-gige.XXXXXX");
-    int fd = mkstemp(path);
-    bool is_good = at && fd >= 0 && write(fd, text->str, text->len) == (ssize_t)text->len;
-    if (fd >= 0)
-        close(fd);
-    g_string_free(text, TRUE);
-    g_string_free(entries, TRUE);
-    g_object_unref(plain);
-    return is_good ? path : NULL;
-}
-
 /** Reads the pictures to serve; all must have the camera's size. */
 static int read_files(struct camera *c, const char *pattern, int width, int height,
                       struct gn_error *error)
@@ -530,6 +535,8 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     c.fault = (enum fault)gn_options_get_enum(options, NULL, NULL, "fault");
     c.loss = gn_options_get_double(options, NULL, NULL, "loss");
     c.step_s = gn_options_get_double(options, NULL, NULL, "step-s");
+    c.delay_ms = gn_options_get_double(options, NULL, NULL, "delay-ms");
+    c.has_chunks = gn_options_get_bool(options, NULL, NULL, "chunks");
     c.can_resend = !gn_options_get_bool(options, NULL, NULL, "no-resend");
     c.begin_ns = gn_clock_get_monotonic_ns();
     arv_fake_camera_write_register(c.fake, REG_VERSION, 0x00010002);
@@ -564,7 +571,7 @@ int main(int argc, char *argv[])
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     int err = gn_options_load(&program, argc, argv, &options, &error);
-    const char *genicam = err ? NULL : write_genicam();
+    const char *genicam = err ? NULL : gn_gige_write_genicam();
     if (!err && gn_options_wants_help(options)) {
         gn_options_print_help(&program, stdout);
     } else if (!err && !genicam) {

@@ -153,7 +153,7 @@ def play(stage, before):
     viewer.wait_for('^frame ', n_seen + 5)
     assert viewer.end() == 0 and lamp.end() == 0 and daemon.end(signal.SIGTERM) == 0
     assert ', 0 dropped' in viewer.read(), viewer.read()
-    assert 'opened again 1 times' in lamp.read(), lamp.read()
+    assert re.search('opened again [1-9]', lamp.read()), lamp.read()
     report = load(os.path.join(out, 'view.json'))
     latencies = sorted(f['latency_ms'] for f in report['frames'])
     ages = sorted(f['receipt']['lighting_age_ms'] for f in report['frames'])
