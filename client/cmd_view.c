@@ -41,8 +41,8 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_BOOL,
      .default_value = "false",
      .help = "Show the composites live; h lists the keys: figures, light, objects and shadows on "
-             "and off, pictures kept, a recording. Without --out and --count files begin again at "
-             "the end, until q. A server that is lost is waited for. Where there is no display "
+             "and off, pictures kept, a recording. Without --out files begin again at the end, "
+             "until q. A server that is lost is waited for. Where there is no display "
              "the composites go to --out, or to " DEFAULT_DIR ", and that is said."},
     {.key = "show",
      .flag = "show",
@@ -288,7 +288,7 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
         err = open_window(v, options, out_error);
     // What is only looked at goes on until somebody has seen enough.
     bool is_loop_said = strcmp(gn_options_get_source(options, NULL, NULL, "loop"), "default") != 0;
-    if (v->show && !v->dir && !r->n_wanted && !is_loop_said)
+    if (v->show && !v->dir && !is_loop_said)
         r->is_looped = true;
     const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
     const struct gn_live_options wanted = {

@@ -59,7 +59,9 @@ static void put(struct block *b, const char *label, const char *text)
         if (b->n == b->max_lines) {
             b->n_left++;
         } else {
-            snprintf(b->label[b->n], sizeof(b->label[0]), "%s", label);
+            // A peer's label may be longer than the column.
+            snprintf(b->label[b->n], sizeof(b->label[0]), "%.*s", get_max(b->label_letters - 1, 0),
+                     label);
             snprintf(b->text[b->n++], sizeof(b->text[0]), "%.*s", n, text);
         }
         label = "";

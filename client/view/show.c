@@ -269,12 +269,13 @@ static void draw_page(struct gn_show *s, struct gn_overlay_box taken)
     uint64_t n = s->n_of_late < N_OF_LATE ? s->n_of_late : N_OF_LATE;
     for (uint64_t i = 0; i < n; i++)
         figures.latency_max_ms = fmax(figures.latency_max_ms, s->of_late[i].latency_ms);
+    if (n > 0)
+        figures.latency_ms = s->of_late[(s->n_of_late - 1) % N_OF_LATE].latency_ms;
     if (n > 1) {
         int64_t last_ns = s->of_late[(s->n_of_late - 1) % N_OF_LATE].at_ns;
         int64_t first_ns = s->of_late[(s->n_of_late - n) % N_OF_LATE].at_ns;
         if (last_ns > first_ns)
             figures.rate_hz = (double)(n - 1) * 1e9 / (double)(last_ns - first_ns);
-        figures.latency_ms = s->of_late[(s->n_of_late - 1) % N_OF_LATE].latency_ms;
     }
     gn_overlay_draw_figures(&s->canvas, &figures, taken);
 }

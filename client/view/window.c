@@ -39,9 +39,32 @@ static SDL_Renderer *create_renderer(SDL_Window *window)
     return renderer ? renderer : SDL_CreateRenderer(window, -1, SDL_RENDERER_SOFTWARE);
 }
 
+static bool has_value(const char *name)
+{
+    const char *value = getenv(name);
+    return value && *value;
+}
+
+/** Which of SDL's drivers to try. Left to itself it takes one that shows nothing where there is no
+ * display, or a server's console. NULL: none; "": whatever the environment says. */
+static const char *choose_driver(void)
+{
+    if (has_value("SDL_VIDEODRIVER"))
+        return "";
+    if (has_value("WAYLAND_DISPLAY"))
+        return has_value("DISPLAY") ? "x11,wayland" : "wayland";
+    return has_value("DISPLAY") ? "x11" : NULL;
+}
+
 int gn_window_open(int width, int height, struct gn_window **out_window, struct gn_error *out_error)
 {
     *out_window = NULL;
+    const char *driver = choose_driver();
+    if (!driver)
+        return gn_error_set(out_error, -ENODEV,
+                            "no display: neither DISPLAY nor WAYLAND_DISPLAY is set");
+    if (*driver)
+        SDL_SetHint(SDL_HINT_VIDEODRIVER, driver);
     SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); // Ctrl-C is the command's
     SDL_SetHint(SDL_HINT_VIDEO_ALLOW_SCREENSAVER, "1");
     SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");

@@ -78,13 +78,13 @@ def start_badly(*arguments):
 class Daemon:
     """A running gnomond with a room of its own, on ports that it picked."""
 
-    def __init__(self, settings='', server='', rooms=None):
+    def __init__(self, settings='', server='', rooms=None, listen='127.0.0.1:0'):
         self.room = rooms or Room(settings, server)
         ready = os.path.join(self.room.path, 'ready')
         self.log = open(os.path.join(self.room.path, 'log'), 'w+')
         self.is_killed = False
         self.process = subprocess.Popen(
-            [binary(), '--config', self.room.config, '--listen', '127.0.0.1:0',
+            [binary(), '--config', self.room.config, '--listen', listen,
              '--http', '127.0.0.1:0', '--ready-file', ready], stderr=self.log)
         deadline = time.monotonic() + 60
         while not os.path.exists(ready):

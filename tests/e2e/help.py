@@ -20,7 +20,7 @@ OPTIONS = [
     ([GNOMON, 'screen'], CONNECT | (FEED - {'sequence'}) | {'stream', 'scale'}),
     ([GNOMON, 'view'], CONNECT | FEED | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
                                                   'quality', 'budget-ms', 'outstanding',
-                                                  'match', 'sync-light'}),
+                                                  'match', 'sync-light', 'window', 'show'}),
     ([GNOMON, 'replay'], CONNECT | {'info', 'streams', 'rate-factor', 'as-fast-as-possible',
                                     'open-loop', 'pin-light', 'loop', 'out', 'expect-equal'}),
     ([GNOMON, 'doctor'], SERVER),
