@@ -361,6 +361,28 @@ def test_probe_files():
         viewer.succeed()
 
 
+def test_probe_table_and_mask():
+    """Codes through a table, a lamp in them masked, are the same light as plain light of 1."""
+    codes = bytearray(b'\x75\x30' * 512)  # 30000, which the table calls 1
+    for y in range(2, 14):
+        codes[2 * (32 * y + 14):2 * (32 * y + 26)] = b'\xff' * 24
+    setup = {'projection': 'latlong', 'response': {'type': 'table', 'table': [0, 65535 / 30000]}}
+    masked = dict(setup, mask=[{'center': [20, 8], 'radius': 8.7}])
+    with Daemon() as daemon, Bench() as bench:
+        bench.write('codes.png', png_bytes(32, 16, bytes(codes), 1, 16))
+        seen = {}
+        for n, (name, files, what) in enumerate((('plain', 'light.exr', None), ('lamp', 'codes.png', setup),
+                                                 ('masked', 'codes.png', masked)), 1):
+            more = ['--first-sequence', str(n)]
+            if what:
+                more += ['--setup', bench.write(name + '.json', json.dumps(what).encode())]
+            probe(daemon, bench, *more, files=files).succeed()
+            view(daemon, bench, '--count', '1', '--sync-light', str(n), out=name).succeed()
+            seen[name] = pixel(read_png(bench.at(name + '/f000.png'))[2], 32, 24)
+        off = {name: max(abs(a - b) for a, b in zip(seen[name], seen['plain'])) for name in seen}
+        assert off['masked'] <= 1 and off['lamp'] > 5, seen
+
+
 def test_view_files():
     """Camera frames that do not fit, and names of every kind."""
     with Daemon() as daemon, Bench(1) as bench:
@@ -473,5 +495,6 @@ def test_usage():
 
 run_tests([test_frames, test_outstanding, test_probe_killed, test_daemon_killed,
            test_daemon_stopped, test_daemon_slow, test_jpeg, test_sync_light, test_several_views,
-           test_no_light, test_late_start, test_interrupt, test_probe_files, test_view_files,
+           test_no_light, test_late_start, test_interrupt, test_probe_files,
+           test_probe_table_and_mask, test_view_files,
            test_sequence, test_doctor, test_usage])
