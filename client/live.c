@@ -31,21 +31,16 @@ int gn_live_count_asked(const struct gn_options *options)
 
 const char *gn_live_find_misuse(const struct gn_options *options)
 {
-    static const char *const settings[] = {"frame-size", "frame-rate", "exposure-us", "gain",
-                                           "pixel-format"};
-    static const char *const own[] = {"lock-white-balance", "controls"};
+    static const char *const settings[] = {"frame-size", "frame-rate",   "exposure-us",
+                                           "gain",       "pixel-format", "lock-white-balance",
+                                           "controls"};
     int n_cameras = gn_live_count_asked(options);
     if (n_cameras > 1)
         return "one camera can be read, not several";
     for (size_t i = 0; n_cameras == 0 && i < GN_ARRAY_LEN(settings); i++) {
         if (gn_options_is_set(options, NULL, NULL, settings[i]))
-            return "--frame-size, --frame-rate, --exposure-us, --gain and --pixel-format are for "
-                   "cameras, and none is named";
-    }
-    bool is_v4l2 = gn_options_is_set(options, NULL, NULL, "v4l2");
-    for (size_t i = 0; !is_v4l2 && i < GN_ARRAY_LEN(own); i++) {
-        if (gn_options_is_set(options, NULL, NULL, own[i]))
-            return "--lock-white-balance and --controls are for --v4l2 cameras";
+            return "--frame-size, --frame-rate, --exposure-us, --gain, --pixel-format, "
+                   "--lock-white-balance and --controls are for cameras, and none is named";
     }
     return NULL;
 }

@@ -58,12 +58,12 @@
         {.key = "lock-white-balance",                                                              \
          .flag = "lock-white-balance",                                                             \
          .type = GN_OPTION_BOOL,                                                                   \
-         .help = "With --v4l2: the camera's automatic white balance is off."},                     \
+         .help = "The camera's automatic white balance is off."},                                  \
         {.key = "controls",                                                                        \
          .flag = "controls",                                                                       \
          .type = GN_OPTION_STRING,                                                                 \
          .value_name = "NAME=N,...",                                                               \
-         .help = "With --v4l2: any other settings of the camera, by its own names."},              \
+         .help = "Any other settings of the camera, by its own names."},                           \
     {                                                                                              \
         .key = "pixel-format", .flag = "pixel-format", .type = GN_OPTION_STRING,                   \
         .value_name = "NAME",                                                                      \

@@ -46,7 +46,8 @@ struct picture {
 
 struct gige {
     struct gn_source head;
-    struct gn_live_options options; // without its strings
+    struct gn_live_options options; // controls are ours, the other strings NULL
+    char *controls;                 // owned, may be NULL
     struct gn_thread thread;
     atomic_bool is_ending;
     // What all openings have in common; immutable.
@@ -58,6 +59,7 @@ struct gige {
     struct gn_gige_place place;
     struct gn_gige_device device;
     struct gn_device_clock clock;
+    uint64_t frame_id;           // of the last picture; 0: none yet
     struct gn_thread undertaker; // closes what does not answer any more, which takes seconds
     struct gn_gige_device dead;
     // owner: reader
@@ -130,13 +132,29 @@ static int64_t get_time_ns(struct gige *s, ArvBuffer *buffer)
     return time_ns - (int64_t)(s->device.exposure_us * 500);
 }
 
+/** Pictures between the last and this of which not a packet came. Ids count up from 1, those of 16
+ * bits begin again after 65535 (GigE Vision 2.0, 24). */
+static uint64_t count_gap(struct gige *s, uint64_t id)
+{
+    uint64_t last = s->frame_id;
+    s->frame_id = id;
+    if (last == 0 || id == 0)
+        return 0;
+    if (id <= last && last <= 65535) // it began again
+        id += 65535;
+    uint64_t gap = id - last - 1;
+    return gap < 1000 ? gap : 0; // else it counts in another way
+}
+
 /** Takes what Aravis has filled: the newest whole picture replaces an unread one. */
 static void take_buffer(struct gige *s, ArvBuffer *buffer)
 {
     bool is_good = is_whole(s, buffer);
     struct picture p = {buffer, is_good ? get_time_ns(s, buffer) : 0, 0};
+    uint64_t n_lost = count_gap(s, arv_buffer_get_frame_id(buffer));
     gn_mutex_lock(&s->mu);
     p.opening = s->opening;
+    s->counts.n_lost += n_lost;
     if (is_good) {
         s->counts.n_complete++;
         s->counts.n_skipped += s->newest.buffer != NULL;
@@ -221,6 +239,7 @@ static void stream_pictures(struct gige *s)
 static void begin_opening(struct gige *s)
 {
     memset(&s->clock, 0, sizeof(s->clock));
+    s->frame_id = 0;
     gn_mutex_lock(&s->mu);
     s->opening++;
     s->stream = s->device.stream;
@@ -371,6 +390,7 @@ static void gige_close(struct gn_source *source)
     if (s->head.fd >= 0)
         close(s->head.fd);
     free(s->pixels);
+    free(s->controls);
     free(s);
 }
 
@@ -412,7 +432,8 @@ int gn_gige_open(const struct gn_live_options *options, struct gn_source **out_s
         .ops = &gige_ops, .is_live = true, .fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
     s->options = *options;
     s->options.id = s->options.pixel_format = NULL; // borrowed for this call only
-    int err = s->head.fd < 0 ? -errno : 0;
+    s->options.controls = s->controls = options->controls ? strdup(options->controls) : NULL;
+    int err = s->head.fd < 0 ? -errno : options->controls && !s->controls ? -ENOMEM : 0;
     if (err)
         gn_error_set(out_error, err, "%s", strerror(-err));
     else

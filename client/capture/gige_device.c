@@ -12,8 +12,6 @@
 
 #include <arv.h>
 
-#include "common/clock.h"
-
 #define N_BUFFERS 6
 /** Bounds of what a camera may announce. */
 #define MAX_PICTURE_BYTES (64 << 20)
@@ -23,7 +21,7 @@
 #define SOCKET_BUFFER_BYTES (8 << 20)
 #define GVCP_PORT 3956
 /** How often control is asked for again. */
-#define CONTROL_RETRY_US 200000
+#define CONTROL_RETRY_MS 200
 
 static int set_arv_error(struct gn_error *out_error, int err, const struct gn_gige_place *place,
                          const char *what, GError **error)
@@ -138,17 +136,17 @@ static void copy_address(GSocketAddress *socket_address, char *out, size_t size)
     g_free(text);
 }
 
-/** A client that died keeps the camera until its heartbeat is missed, 3 s with most. */
+/** A client that died keeps the camera until its heartbeat is missed, 3 s with most. Tries are
+ * counted, not time: where the machine stands still the camera does not see the time either. */
 static int take_control(ArvGvDevice *device, const struct gn_gige_place *place, int patience_ms,
                         struct gn_error *out_error)
 {
-    int64_t deadline_ns = gn_clock_get_monotonic_ns() + patience_ms * GN_NS_PER_MS;
-    while (!arv_gv_device_is_controller(device)) {
-        if (gn_clock_get_monotonic_ns() > deadline_ns)
+    for (int waited_ms = 0; !arv_gv_device_is_controller(device); waited_ms += CONTROL_RETRY_MS) {
+        if (waited_ms >= patience_ms)
             return gn_error_set(out_error, -EBUSY,
                                 "camera %s: another program controls it; end that first",
                                 place->id);
-        g_usleep(CONTROL_RETRY_US);
+        g_usleep(CONTROL_RETRY_MS * 1000);
         (void)!arv_gv_device_take_control(device, NULL);
     }
     return 0;
@@ -186,8 +184,14 @@ static int set_format(struct gn_gige_device *d, const struct gn_gige_place *plac
     else if (choose_format(d->camera, options->is_8_bit))
         arv_camera_set_pixel_format(d->camera, choose_format(d->camera, options->is_8_bit)->code,
                                     &error);
-    if (error)
-        return set_arv_error(out_error, -EINVAL, place, "cannot set --pixel-format", &error);
+    return error ? set_arv_error(out_error, -EINVAL, place, "cannot set --pixel-format", &error)
+                 : 0;
+}
+
+static int read_format(struct gn_gige_device *d, const struct gn_gige_place *place,
+                       struct gn_error *out_error)
+{
+    GError *error = NULL;
     ArvPixelFormat code = arv_camera_get_pixel_format(d->camera, &error);
     if (error)
         return set_arv_error(out_error, -EIO, place, "cannot read its pixel format", &error);
@@ -256,6 +260,30 @@ static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *pl
     d->frame_rate_hz = arv_camera_get_frame_rate(c, NULL);
     d->exposure_us = arv_camera_get_exposure_time(c, NULL);
     return 0;
+}
+
+/** Settings by the camera's own names, "NAME=VALUE,...", which have the last word. */
+static int set_controls(struct gn_gige_device *d, const struct gn_gige_place *place,
+                        const struct gn_live_options *options, struct gn_error *out_error)
+{
+    GError *error = NULL;
+    int err = 0;
+    if (options->is_white_balance_locked)
+        arv_camera_set_string(d->camera, "BalanceWhiteAuto", "Off", &error);
+    if (error)
+        return set_arv_error(out_error, -EINVAL, place, "--lock-white-balance", &error);
+    gchar **words = g_strsplit(options->controls ? options->controls : "", ",", -1);
+    for (int i = 0; words[i] && !err; i++) {
+        char what[128];
+        snprintf(what, sizeof(what), "--controls %s", words[i]);
+        if (!strchr(words[i], '='))
+            err = gn_error_set(out_error, -EINVAL, "%s: each is NAME=VALUE", what);
+        else if (!arv_device_set_features_from_string(arv_camera_get_device(d->camera), words[i],
+                                                      &error))
+            err = set_arv_error(out_error, -EINVAL, place, what, &error);
+    }
+    g_strfreev(words);
+    return err;
 }
 
 /** Asks for a stamp behind each picture, of cameras that can: some leave the leader's empty. */
@@ -333,9 +361,13 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
     if (!err)
         err = set_format(&d, place, options, out_error);
     if (!err)
-        err = set_size(&d, place, options, out_error);
-    if (!err)
         err = set_exposure(&d, place, options, out_error);
+    if (!err)
+        err = set_controls(&d, place, options, out_error);
+    if (!err)
+        err = read_format(&d, place, out_error);
+    if (!err)
+        err = set_size(&d, place, options, out_error);
     if (!err) {
         set_chunks(&d);
         err = start_stream(&d, place, out_error);

@@ -124,7 +124,7 @@ int main(int argc, char *argv[])
     struct gn_source *source = NULL;
     struct gn_error error = {0};
     struct expected expected = {0};
-    long n_wanted = atol(argv[6]), n = 0, n_wrong = 0;
+    long n_wanted = atol(argv[6]), n = 0, n_wrong = 0, n_unordered = 0;
     static double off_ms[100000]; // by how much steps between pictures are no whole frame times
     double age_max_ms = 0, age_min_ms = 1e9, age_sum_ms = 0, step_max_ms = 0;
     int64_t last_ns = 0, gap_ns = 0;
@@ -155,7 +155,7 @@ int main(int argc, char *argv[])
             age_max_ms = age_ms > age_max_ms ? age_ms : age_max_ms;
             age_min_ms = age_ms < age_min_ms ? age_ms : age_min_ms;
             n_wrong += is_checked && !is_next(&expected, &capture, &next);
-            n_wrong += capture.time_ns <= last_ns;
+            n_unordered += capture.time_ns <= last_ns;
             if (last_ns && now_ns - heard_ns > gap_ns)
                 gap_ns = now_ns - heard_ns;
             if (n > 0 && n < (long)GN_ARRAY_LEN(off_ms) && options.frame_rate_hz > 0) {
@@ -175,12 +175,13 @@ int main(int argc, char *argv[])
     if (err)
         fprintf(stderr, "gige_tool: %s\n", error.text);
     cpu_ms = get_cpu_ms() - cpu_ms;
-    printf("{\"pictures\": %ld, \"wrong\": %ld, \"complete\": %" PRIu64 ", \"incomplete\": %" PRIu64
-           ", \"skipped\": %" PRIu64 ", \"lost_packets\": %" PRIu64 ", \"resent\": %" PRIu64
-           ", \"reopened\": %" PRIu64 ", \"copies\": %.3f, \"age_ms\": [%.2f, %.2f, %.2f], "
+    printf("{\"pictures\": %ld, \"wrong\": %ld, \"unordered\": %ld, \"complete\": %" PRIu64
+           ", \"incomplete\": %" PRIu64 ", \"skipped\": %" PRIu64 ", \"lost\": %" PRIu64
+           ", \"lost_packets\": %" PRIu64 ", \"resent\": %" PRIu64 ", \"reopened\": %" PRIu64
+           ", \"copies\": %.3f, \"age_ms\": [%.2f, %.2f, %.2f], "
            "\"gap_ms\": %.1f, \"first_ms\": %.1f, \"cpu_ms\": %.3f, \"off_ms\": %.3f}\n",
-           n, n_wrong, c.n_complete, c.n_incomplete, c.n_skipped, c.n_lost_packets,
-           c.n_resent_packets, c.n_reopened,
+           n, n_wrong, n_unordered, c.n_complete, c.n_incomplete, c.n_skipped, c.n_lost,
+           c.n_lost_packets, c.n_resent_packets, c.n_reopened,
            c.read_bytes ? (double)c.copied_bytes / (double)c.read_bytes : 0, age_min_ms,
            n ? age_sum_ms / (double)n : 0, age_max_ms, (double)gap_ns * 1e-6, step_max_ms,
            n ? cpu_ms / (double)n : 0, n > 1 ? get_median(off_ms, (size_t)n - 1) : 0);

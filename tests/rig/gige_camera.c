@@ -46,7 +46,15 @@
 #define N_KEPT 8
 #define MAX_FILES 4096
 
-enum fault { FAULT_NONE, FAULT_SIZE, FAULT_FORMAT, FAULT_TRUNCATED, FAULT_CODES, FAULT_HUGE };
+enum fault {
+    FAULT_NONE,
+    FAULT_SIZE,
+    FAULT_FORMAT,
+    FAULT_TRUNCATED,
+    FAULT_CODES,
+    FAULT_HUGE,
+    FAULT_DROP
+};
 
 static const struct gn_option option_table[] = {
     {.key = "address",
@@ -119,7 +127,7 @@ static const struct gn_option option_table[] = {
     {.key = "fault",
      .flag = "fault",
      .type = GN_OPTION_ENUM,
-     .choices = "none|size|format|truncated|codes|huge",
+     .choices = "none|size|format|truncated|codes|huge|drop",
      .default_value = "none",
      .help = "Lie: pictures of another size or format than agreed, their end missing, codes above "
              "the format's, or an absurd size."},
@@ -289,7 +297,8 @@ static void send_frame(struct camera *c)
     if (c->delay_ms > 0)
         g_usleep((gulong)(drand48() * c->delay_ms * 1e3));
     uint32_t n_blocks = (uint32_t)((f->n_bytes + f->chunk - 1) / f->chunk);
-    for (uint32_t i = 0; i <= n_blocks + 1; i++) {
+    bool is_dropped = c->fault == FAULT_DROP && c->n_frames % 5 == 4;
+    for (uint32_t i = 0; i <= n_blocks + 1 && !is_dropped; i++) {
         send_packet(c, f, i, false);
         if (i % 64 == 63)
             answer_waiting(c, 0); // a request to send again does not wait for long

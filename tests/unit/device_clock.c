@@ -39,8 +39,8 @@ static void test_nonsense(void **state)
     (void)state;
     struct gn_device_clock clock = {0};
     int64_t now_ns = 100 * GN_NS_PER_S;
-    assert_true(gn_device_clock_map(&clock, 0, now_ns) == now_ns);
-    assert_true(gn_device_clock_map(&clock, UINT64_MAX, now_ns) == now_ns);
+    assert_true(gn_device_clock_map(&clock, 0, now_ns - 2) == now_ns - 2);
+    assert_true(gn_device_clock_map(&clock, UINT64_MAX, now_ns - 1) == now_ns - 1);
     assert_true(gn_device_clock_map(&clock, 5 * GN_NS_PER_S, now_ns) == now_ns);
     // 10 ms later by the camera, 14 ms by the arrival.
     int64_t later_ns = now_ns + 14 * GN_NS_PER_MS;
@@ -52,11 +52,31 @@ static void test_nonsense(void **state)
     assert_true(gn_device_clock_map(&clock, 1, later_ns + 2) == later_ns + 2);
     assert_true(gn_device_clock_map(&clock, 9 * GN_NS_PER_S, later_ns + 3) == later_ns + 3);
     assert_true(gn_device_clock_map(&clock, 9 * GN_NS_PER_S + 5, later_ns + 9) == later_ns + 8);
+    later_ns += 10;
     for (uint64_t device_ns = 1; device_ns; device_ns = device_ns * 3) { // wraps in the end
-        int64_t got_ns = gn_device_clock_map(&clock, device_ns, later_ns);
+        int64_t got_ns = gn_device_clock_map(&clock, device_ns, ++later_ns);
         assert_true(got_ns <= later_ns && got_ns >= later_ns - GN_NS_PER_S);
         if (device_ns > UINT64_MAX / 4)
             break;
+    }
+}
+
+/** The first picture came 100 ms late, the next ones at once: time goes on, and then is right. */
+static void test_late_first(void **state)
+{
+    (void)state;
+    struct gn_device_clock clock = {0};
+    int64_t begin_ns = 100 * GN_NS_PER_S, last_ns = 0;
+    for (int i = 0; i < 8; i++) {
+        int64_t true_ns = begin_ns + i * FRAME_NS;
+        int64_t arrival_ns = true_ns + (i == 0  ? 100 * GN_NS_PER_MS
+                                        : i < 4 ? (101 + i) * GN_NS_PER_MS - i * FRAME_NS
+                                                : 0);
+        int64_t got_ns = gn_device_clock_map(&clock, (uint64_t)(i + 1) * FRAME_NS, arrival_ns);
+        assert_true(got_ns > last_ns);
+        assert_true(got_ns <= arrival_ns);
+        assert_true(i < 4 || got_ns == true_ns);
+        last_ns = got_ns;
     }
 }
 
@@ -65,6 +85,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_jitter_and_drift),
         cmocka_unit_test(test_nonsense),
+        cmocka_unit_test(test_late_first),
     };
     cmocka_set_message_output(CM_OUTPUT_TAP);
     return cmocka_run_group_tests(tests, NULL, NULL);
