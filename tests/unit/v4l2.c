@@ -109,6 +109,12 @@ static void test_newest_wins_and_gaps_are_counted(void **state)
     assert_int_equal(read_picture(source).data[0], 130);
     struct gn_source_counts n = get_counts(source);
     assert_true(n.n_complete == 4 && n.n_read == 2 && n.n_skipped == 2 && n.n_lost == 2);
+    for (uint32_t i = 4; i < 40; i++) { // all that are replaced go back to the driver
+        gn_fake_fill(&fake, i, 20);
+        if (i % 3 == 0)
+            read_picture(source);
+    }
+    assert_int_equal(get_counts(source).n_skipped, 2 + 24);
     gn_fake_fill(&fake, 1, 128); // a number that goes back is no gap of four thousand millions
     read_picture(source);
     gn_fake_fill(&fake, 3, 128);
@@ -474,18 +480,20 @@ static void test_mjpeg_passes_as_jpeg(void **state)
     b = gn_fake_fill(&fake, 1, 0); // zeros are no JPEG
     b->bytesused = 1000;
     expect_news(source, "no JPEG of the size that was set");
-    n = make_jpeg(320, 240, file, sizeof(file));
-    b = gn_fake_fill(&fake, 2, 0);
-    memcpy(fake.memory[b->index], file, n);
-    b->bytesused = (uint32_t)n;
-    expect_news(source, "");
-    b = gn_fake_fill(&fake, 3, 0);
+    for (int i = 0; i < 2; i++) {
+        n = make_jpeg(i ? 640 : 320, i ? 240 : 480, file, sizeof(file));
+        b = gn_fake_fill(&fake, (uint32_t)(2 + i), 0);
+        memcpy(fake.memory[b->index], file, n);
+        b->bytesused = (uint32_t)n;
+        expect_news(source, "");
+    }
+    b = gn_fake_fill(&fake, 4, 0);
     b->bytesused = 0;
     expect_news(source, "");
-    b = gn_fake_fill(&fake, 4, 0xff);
+    b = gn_fake_fill(&fake, 5, 0xff);
     b->bytesused = fake.pix.sizeimage + 1;
     expect_news(source, "");
-    assert_int_equal(get_counts(source).n_incomplete, 4);
+    assert_int_equal(get_counts(source).n_incomplete, 5);
     gn_source_close(&source);
     gn_fake_finish(&fake);
 }

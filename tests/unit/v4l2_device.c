@@ -69,6 +69,11 @@ static void test_sizes_and_rates(void **state)
     o.frame_rate_hz = 25.1; // as cameras say 29.97 for 30
     assert_non_null(set_format(&fake, &o, &error));
     assert_int_equal(fake.interval_ms, 40);
+    fake.is_silent = true; // the driver takes the nearest that it has
+    assert_non_null(set_format(&fake, &o, &error));
+    o.frame_rate_hz = 60;
+    assert_null(set_format(&fake, &o, &error));
+    assert_non_null(strstr(error.text, "no 60 pictures/s at 320x240 in YUYV; it has rates of its"));
     gn_fake_finish(&fake);
 }
 
@@ -92,6 +97,9 @@ static void test_refusals_name_what_there_is(void **state)
         {many_formats,
          {.width = 800, .height = 600, .pixel_format = "YUYV"},
          "no 800x600 in YUYV; it has 320x240@25, 640x480@25"},
+        {many_formats,
+         {.width = 160, .height = 240},
+         "no 160x240 in Y10; it has 320x240@25, 640x480@25"},
         {many_formats,
          {.width = 640, .height = 480, .frame_rate_hz = 60, .pixel_format = "GREY"},
          "no 60 pictures/s at 640x480 in GREY; it has 25, 10"},
@@ -125,8 +133,11 @@ static void test_controls(void **state)
     gn_fake_init(&fake);
     gn_fake_add_control(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY, "Exposure, Dynamic", 0, 1, 1);
     assert_int_equal(set_controls(&fake, &(struct gn_live_options){0}, &error), 0);
+    const struct gn_live_options exposure = {.exposure_us = 8040};
     assert_int_equal(gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_AUTO)->value,
                      V4L2_EXPOSURE_APERTURE_PRIORITY); // left as it is
+    assert_int_equal(set_controls(&fake, &exposure, &error), 0);
+    assert_int_equal(gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY)->value, 0);
     const struct gn_live_options o = {.exposure_us = 8040,
                                       .has_gain = true,
                                       .gain = 12,
@@ -217,8 +228,9 @@ static void test_description(void **state)
     char text[1000] = "";
     gn_fake_init(&fake);
     fake.formats = many_formats;
+    fake.card = "Fa\x1bke\n"; // never to a terminal
     assert_int_equal(gn_v4l2_describe(&fake.io, "/dev/video3", say, text, NULL), 0);
-    assert_string_equal(text, "/dev/video3: Fake\n"
+    assert_string_equal(text, "/dev/video3: Fa?ke?\n"
                               "  Y10 320x240@25, 640x480@25\n"
                               "  YUYV 320x240@25, 640x480@25\n"
                               "  MJPG 320x240@25, 640x480@25\n"

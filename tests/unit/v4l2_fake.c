@@ -76,6 +76,8 @@ static int list_rate(const struct gn_fake *f, struct v4l2_frmivalenum *rate)
     rate->type = V4L2_FRMIVAL_TYPE_DISCRETE;
     rate->discrete.numerator = 1;
     rate->discrete.denominator = rate->index ? 10 : 25;
+    if (f->is_silent)
+        return -ENOTTY;
     return f->is_endless || rate->index < 2 ? 0 : -EINVAL;
 }
 

@@ -41,6 +41,7 @@ struct gn_fake {
     uint32_t length;  // of a buffer as it is said; 0: the truth
     bool is_endless;  // lists and filled buffers have no end
     bool has_event;
+    bool is_silent; // about its rates
     /* What the tests look at. */
     int n_open, n_mapped, n_opened, n_streaming;
     uint8_t *memory[GN_FAKE_BUFFERS]; // of exactly pix.sizeimage bytes
