@@ -3,14 +3,16 @@
 /*
  * gnomon track: streams the poses of a movable object, from a file or along a circle.
  */
+#include "client/cmd_track.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/cmd.h"
 #include "client/feed.h"
+#include "client/poses.h"
 #include "common/file.h"
 #include "proto/attr.h"
 
@@ -42,30 +44,45 @@ static const struct gn_option option_table[] = {
      .help =
          "Instead, to try things out: once in 4 s around the world's z axis at this distance in "
          "metres, at height 0, until Ctrl-C or --count."},
-    {.key = "rate",
-     .flag = "rate",
+    {.key = "files",
+     .flag = "files",
+     .type = GN_OPTION_STRING,
+     .value_name = "PATTERN",
+     .help = "With --markers: a folder's pictures, or a pattern in quotes such as 'frames/*.png'."},
+    GN_FEED_VIDEO_OPTION,
+    GN_LIVE_OPTIONS,
+    {.key = "camera",
+     .flag = "camera",
+     .type = GN_OPTION_STRING,
+     .value_name = "FILE",
+     .help =
+         "With --markers: camera.json with intrinsics (docs/frames.md), and where the camera is "
+         "if no marker of the world says that."},
+    GN_POSES_OPTIONS,
+    {.key = "predict-ms",
+     .flag = "predict-ms",
      .type = GN_OPTION_DOUBLE,
-     .min = 0.001,
-     .max = 1000,
-     .value_name = "HZ",
-     .help = "Poses per second. Without it a file keeps its own times; an orbit goes at 60. Up to "
-             "2 s late the poses catch up; beyond, the rest is shifted and said."},
-    {.key = "count",
-     .flag = "count",
-     .type = GN_OPTION_INT,
-     .min = 1,
-     .max = 1e9,
-     .value_name = "N",
-     .help = "Stop after so many poses."},
+     .min = 0,
+     .max = 100,
+     .default_value = "0",
+     .value_name = "MS",
+     .help = "With --markers: send where the object will be so long after the picture, by constant "
+             "speed: about the time until the poses are seen."},
+    GN_FEED_PACE_OPTIONS("Without it a file of poses keeps its own times; an orbit goes at 60, "
+                         "pictures at 10."),
 };
 
 static const struct gn_program program = {
     .name = "gnomon track",
-    .usage = "--object NAME --poses FILE|--orbit RADIUS [OPTION]...",
-    .summary = "Moves an object of the room's scene. It stays at its last pose when this ends.",
+    .usage = "--object NAME --poses FILE|--orbit RADIUS|{--markers FILE --camera FILE --files "
+             "PATTERN|--gige ID} [OPTION]...",
+    .summary = "Moves an object of the room's scene: by a file of poses, along a circle, or by "
+               "markers on it that a camera sees. It stays at its last pose when this ends.",
     .notes = "Examples:\n"
              "  gnomon track --object teapot --orbit 0.2\n"
-             "  gnomon track --object teapot --poses path.jsonl --rate 60\n",
+             "  gnomon track --object teapot --poses path.jsonl --rate 60\n"
+             "  gnomon track --object teapot --markers markers.json --camera camera.json --gige "
+             "any\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
@@ -172,9 +189,16 @@ static const char *find_misuse(const struct gn_options *options, const struct gn
     const char *name = gn_options_get_string(options, NULL, NULL, "object");
     if (!name[0] || strlen(name) >= sizeof(message->object))
         return "--object: names have 1 to 63 bytes";
+    if (gn_options_is_set(options, NULL, NULL, "marker") ||
+        gn_options_is_set(options, NULL, NULL, "files") ||
+        gn_options_is_set(options, NULL, NULL, "video") ||
+        gn_options_is_set(options, NULL, NULL, "camera") || gn_live_count_asked(options) > 0)
+        return "a camera's pictures are looked at for the markers of a file: give --markers FILE";
+    if (gn_poses_find_misuse(options))
+        return gn_poses_find_misuse(options);
     if (gn_options_is_set(options, NULL, NULL, "poses") ==
         gn_options_is_set(options, NULL, NULL, "orbit"))
-        return "give one of --poses and --orbit";
+        return "give one of --poses, --orbit, and --markers with a camera";
     return NULL;
 }
 
@@ -227,6 +251,10 @@ int gn_cmd_track(int argc, char *const argv[])
     int rc = gn_cmd_load(&program, argc, argv, &options);
     if (rc <= 0)
         return rc < 0 ? 2 : 0;
+    if (gn_options_is_set(options, NULL, NULL, "markers")) {
+        gn_options_destroy(&options);
+        return gn_cmd_track_camera(&program, argc, argv);
+    }
     const char *misuse = find_misuse(options, &t.message);
     int status = 2;
     if (misuse)

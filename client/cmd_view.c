@@ -23,6 +23,7 @@ static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
     GN_FEED_OPTIONS,
     GN_LIVE_OPTIONS,
+    GN_POSES_OPTIONS,
     {.key = "camera",
      .flag = "camera",
      .type = GN_OPTION_STRING,
@@ -121,6 +122,9 @@ static const struct gn_program program = {
     .n_options = GN_ARRAY_LEN(option_table),
 };
 
+/** Where the camera is said to be where nobody knows: it looks up and sees nothing of any scene. */
+static const struct gn_pose nowhere = {{1, 0, 0, 0}, {0, 0, 1e5}};
+
 /** What is wrong with the options together; NULL: nothing. */
 static const char *find_misuse(const struct gn_options *options)
 {
@@ -129,6 +133,8 @@ static const char *find_misuse(const struct gn_options *options)
     bool has_video = gn_options_is_set(options, NULL, NULL, "video");
     bool has_camera = gn_options_is_set(options, NULL, NULL, "camera");
     const char *misuse = gn_feed_find_misuse(options);
+    if (!misuse)
+        misuse = gn_poses_find_misuse(options);
     if (misuse)
         return misuse;
     if (!gn_options_is_set(options, NULL, NULL, "out") &&
@@ -159,6 +165,32 @@ static void set_light_wanted(struct gn_viewer *v, struct gn_msg_frame *frame)
     }
 }
 
+/**
+ * Says where the camera was when it took the picture: by the markers in it, by the source, or where
+ * camera.json has it at rest. Without the world's markers the frame goes all the same, and comes
+ * back as it is.
+ */
+static int place_frame(struct gn_viewer *v, const struct gn_capture *capture,
+                       struct gn_msg_frame *frame, struct gn_error *out_error)
+{
+    struct gn_pose pose =
+        capture->has_pose ? capture->world_from_camera : v->camera.world_from_camera;
+    int n_seen = v->poses ? gn_poses_take(v->poses, capture, out_error) : 0;
+    if (n_seen < 0)
+        return n_seen;
+    if (v->show)
+        gn_show_set_wishes(v->show, frame);
+    if (v->poses && !gn_poses_get_camera(v->poses, &pose)) {
+        pose = nowhere;
+        frame->no_virtual = frame->no_shadow = true;
+        v->n_unplaced++;
+    }
+    if (v->show)
+        gn_show_put_pose(v->show, &pose);
+    gn_cmd_make_transform(&pose, &frame->views[0].world_from_camera);
+    return 0;
+}
+
 static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
                       struct gn_error *out_error)
 {
@@ -177,12 +209,6 @@ static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
                             v->camera.height);
     struct gn_viewer_pending *p = gn_viewer_get_free(v);
     struct gn_msg_frame frame = v->frame;
-    const struct gn_pose *pose =
-        capture->has_pose ? &capture->world_from_camera : &v->camera.world_from_camera;
-    if (v->show) {
-        gn_show_set_wishes(v->show, &frame);
-        gn_show_put_pose(v->show, pose);
-    }
     frame.id = (uint64_t)r->n_sent + 1;
     frame.capture_time_ns = gn_feed_get_capture_ns(r, capture);
     frame.views_count = 1;
@@ -191,7 +217,9 @@ static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
         .picture_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
         .payload_length = (uint32_t)capture->data_bytes,
     };
-    gn_cmd_make_transform(pose, &frame.views[0].world_from_camera);
+    err = place_frame(v, capture, &frame, out_error);
+    if (err)
+        return err;
     set_light_wanted(v, &frame);
     *p = (struct gn_viewer_pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
@@ -259,6 +287,18 @@ static int open_window(struct gn_viewer *v, const struct gn_options *options,
     return 0;
 }
 
+static int open_poses(struct gn_viewer *v, const struct gn_options *options,
+                      struct gn_error *out_error)
+{
+    int err = gn_poses_open(options, &v->camera, false, &v->poses, out_error);
+    if (!err && gn_poses_find_body(v->poses, GN_BODY_WORLD) < 0)
+        err = gn_error_set(out_error, -EINVAL,
+                           "%s: there is no body called \"" GN_BODY_WORLD
+                           "\", whose markers say where the world is",
+                           gn_options_get_string(options, NULL, NULL, "markers"));
+    return err;
+}
+
 static int open_source(struct gn_feed *r, const struct gn_options *options,
                        struct gn_error *out_error)
 {
@@ -268,7 +308,7 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
     const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
     struct gn_sequence sequence = {0};
     struct gn_file_list list = {0};
-    bool is_live = gn_live_count_asked(options) > 0;
+    bool is_live = gn_live_count_asked(options) > 0, has_place = true;
     int err;
     if (dir) {
         err = gn_sequence_read(dir, &sequence, out_error);
@@ -276,7 +316,9 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
         list = sequence.pictures;
         memset(&sequence.pictures, 0, sizeof(sequence.pictures));
     } else {
-        err = gn_camera_read_file(camera_path, &v->camera, out_error);
+        err = gn_poses_is_asked(options)
+                  ? gn_poses_read_camera(camera_path, &v->camera, &has_place, out_error)
+                  : gn_camera_read_file(camera_path, &v->camera, out_error);
         if (!err && pattern)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
     }
@@ -284,6 +326,8 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
     gn_sequence_finish(&sequence);
     v->dir = gn_options_get_string(options, NULL, NULL, "out");
     set_frame_options(v, options);
+    if (!err && gn_poses_is_asked(options))
+        err = open_poses(v, options, out_error);
     if (!err)
         err = open_window(v, options, out_error);
     // What is only looked at goes on until somebody has seen enough.
@@ -316,7 +360,9 @@ static int begin(struct gn_feed *r, struct gn_error *out_error)
         gn_text_clean(title);
         gn_show_set_title(v->show, title);
     }
-    return err || !v->dir ? err : gn_record_open(v->dir, &v->record, out_error);
+    if (!err && v->dir)
+        err = gn_record_open(v->dir, &v->record, out_error);
+    return err || !v->dir || !v->poses ? err : gn_poses_write_to(v->poses, v->dir, out_error);
 }
 
 static int report(struct gn_feed *r, int err, const struct gn_error *error)
@@ -346,6 +392,10 @@ static int report(struct gn_feed *r, int err, const struct gn_error *error)
     if (v->dir)
         printf("; in %s", v->dir);
     printf("\n");
+    if (v->n_unplaced > 0)
+        printf("%ld frames without the world's markers: sent to come back as they are\n",
+               v->n_unplaced);
+    gn_poses_print(v->poses, stdout);
     return err || record_err ? 1 : 0;
 }
 
@@ -365,6 +415,7 @@ int gn_cmd_view(int argc, char *const argv[])
     };
     struct gn_viewer v = {0};
     int status = gn_feed_run(&command, &v.feed, argc, argv);
+    gn_poses_close(&v.poses);
     gn_show_close(&v.show); // where it never came to a report
     return status;
 }

@@ -8,6 +8,7 @@
 #define GN_CLIENT_VIEWER_H
 
 #include "client/feed.h"
+#include "client/poses.h"
 #include "client/view/record.h"
 #include "client/view/show.h"
 #include "common/camera.h"
@@ -30,6 +31,8 @@ struct gn_viewer {
     struct gn_show *show;     // NULL: no window
     bool is_closed;           // the person at the window has had enough
     struct gn_camera camera;
+    struct gn_poses *poses;    // from markers; NULL: the source knows them, or the camera rests
+    long n_unplaced;           // frames in which no marker said where the camera was
     struct gn_msg_frame frame; // what all frames have in common
     uint64_t sync_light;       // 0: not asked for
     int64_t first_sent_ns;

@@ -9,6 +9,8 @@ enum { MAX_PLACES = 40, MIN_PLACES = 6, MAX_STEPS = 25 };
 
 /** Widest half of a profile, px, and its step. */
 static const double max_reach_px = 3.0, step_px = 0.25;
+/** Narrowest cell across whose edge a profile sees both sides, px. */
+static const double min_cell_px = 1.8;
 /** Least difference of linear light across an edge, of full scale. */
 static const double min_contrast = 0.02;
 
@@ -217,7 +219,7 @@ bool gn_edges_refine(const struct gn_grey *grey, const struct gn_camera *camera,
             shortest = fmin(shortest, hypot(p[0] - q[0], p[1] - q[1]));
         }
         double reach = fmin(0.8 * shortest / cells, max_reach_px);
-        if (!(shortest / cells >= 2.5) || !refine_once(grey, camera, reach, found))
+        if (!(shortest / cells >= min_cell_px) || !refine_once(grey, camera, reach, found))
             return false;
     }
     for (int k = 0; k < 4; k++)
@@ -225,4 +227,24 @@ bool gn_edges_refine(const struct gn_grey *grey, const struct gn_camera *camera,
             return false;
     memcpy(corners_px, found, sizeof(found));
     return true;
+}
+
+void gn_edges_widen(double corners_px[4][2], double by_px)
+{
+    double lines[4][2][2], area = 0;
+    for (int k = 0; k < 4; k++)
+        area += corners_px[k][0] * corners_px[(k + 1) % 4][1] -
+                corners_px[k][1] * corners_px[(k + 1) % 4][0];
+    for (int k = 0; k < 4; k++) {
+        const double *p = corners_px[k], *q = corners_px[(k + 1) % 4];
+        double length = hypot(q[0] - p[0], q[1] - p[1]),
+               share = (area > 0 ? by_px : -by_px) / length;
+        for (int a = 0; a < 2; a++) {
+            double outwards = a ? -(q[0] - p[0]) : q[1] - p[1];
+            lines[k][0][a] = p[a] + share * outwards;
+            lines[k][1][a] = q[a] + share * outwards;
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        (void)meet(lines[(k + 3) % 4], lines[k], corners_px[k]);
 }

@@ -27,9 +27,15 @@ struct gn_grey {
  * 2 px) onto the edges of the square. cells: of its side, its border included; the border is one
  * cell wide. Each edge is measured across, by how much light is on either side, at many places
  * along what the lens makes of a straight line, and a straight line fitted to that. Returns false,
- * and leaves them, where cells are under 2.5 px wide or an edge is not seen well enough.
+ * and leaves them, where cells are under 1.8 px wide or an edge is not seen well enough.
  */
 bool gn_edges_refine(const struct gn_grey *grey, const struct gn_camera *camera, int cells,
                      double corners_px[4][2]);
+
+/**
+ * Moves the edges of a square outwards: whole-pixel corners are the centres of its outermost dark
+ * pixels, half a pixel within it. Corners whose edges hardly differ in direction stay.
+ */
+void gn_edges_widen(double corners_px[4][2], double by_px);
 
 #endif

@@ -188,9 +188,12 @@ static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
     t->n_last = err ? 0 : t->n_sightings;
     if (t->n_last > 0)
         set_window(t);
-    for (int i = 0; i < t->n_sightings; i++)
-        t->counts.n_coarse_corners +=
-            !gn_edges_refine(&t->grey, &t->camera, t->cells, t->sightings[i].corners);
+    for (int i = 0; i < t->n_sightings; i++) {
+        if (!gn_edges_refine(&t->grey, &t->camera, t->cells, t->sightings[i].corners)) {
+            gn_edges_widen(t->sightings[i].corners, 0.5);
+            t->counts.n_coarse_corners++;
+        }
+    }
     return err;
 }
 

@@ -1,0 +1,216 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/poses.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "client/feature.h"
+#include "client/vision/markers.h"
+#include "common/device_json.h"
+#include "common/json.h"
+#include "common/png.h"
+
+struct gn_poses {
+    struct gn_bodies bodies;
+    struct gn_tracker *tracker;
+    int world;       // its body
+    const char *dir; // for --debug-markers, borrowed; NULL: none
+    FILE *log;       // NULL: none
+};
+
+bool gn_poses_is_asked(const struct gn_options *options)
+{
+    return gn_options_is_set(options, NULL, NULL, "markers") ||
+           gn_options_is_set(options, NULL, NULL, "marker");
+}
+
+const char *gn_poses_find_misuse(const struct gn_options *options)
+{
+    if (gn_options_is_set(options, NULL, NULL, "markers") &&
+        gn_options_is_set(options, NULL, NULL, "marker"))
+        return "give one of --markers FILE and --marker DICT:ID:SIZE";
+    if (!gn_poses_is_asked(options) && (gn_options_is_set(options, NULL, NULL, "debug-markers") ||
+                                        !gn_options_get_bool(options, NULL, NULL, "steady")))
+        return "--debug-markers and --no-steady are for poses from markers: give --markers FILE or "
+               "--marker DICT:ID:SIZE";
+    return NULL;
+}
+
+int gn_poses_read_camera(const char *path, struct gn_camera *out_camera, bool *out_has_place,
+                         struct gn_error *out_error)
+{
+    struct gn_json root;
+    int err = gn_json_load_file(path, &root, out_error);
+    if (err)
+        return err;
+    *out_has_place = gn_json_has(&root, "world_from_camera");
+    err = gn_camera_read_json(&root, *out_has_place, out_camera, out_error);
+    gn_json_finish(&root);
+    return err;
+}
+
+int gn_poses_write_to(struct gn_poses *p, const char *dir, struct gn_error *out_error)
+{
+    char path[4096];
+    int n = snprintf(path, sizeof(path), "%s/poses.jsonl", dir);
+    if (n >= (int)sizeof(path))
+        return gn_error_set(out_error, -ENAMETOOLONG, "%s: the path is too long", dir);
+    p->log = fopen(path, "w");
+    return p->log ? 0
+                  : gn_error_set(out_error, -errno, "cannot write %s: %s", path, strerror(errno));
+}
+
+int64_t gn_poses_get_time_ns(const struct gn_capture *capture)
+{
+    return capture->time_ns ? capture->time_ns : (int64_t)llround(capture->time_s * 1e9);
+}
+
+int gn_poses_open(const struct gn_options *options, const struct gn_camera *camera, bool is_raw,
+                  struct gn_poses **out_poses, struct gn_error *out_error)
+{
+    *out_poses = NULL;
+    if (!gn_vision_is_built())
+        return gn_feature_refuse(GN_FEATURE_VISION, out_error);
+    const char *path = gn_options_get_string(options, NULL, NULL, "markers");
+    struct gn_poses *p = calloc(1, sizeof(*p));
+    if (!p)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    p->dir = gn_options_get_string(options, NULL, NULL, "debug-markers");
+    int err = path ? gn_bodies_read_file(path, &p->bodies, out_error)
+                   : gn_bodies_read_text(gn_options_get_string(options, NULL, NULL, "marker"),
+                                         &p->bodies, out_error);
+    p->world = gn_bodies_find(&p->bodies, GN_BODY_WORLD);
+    const struct gn_tracker_options wanted = {
+        .camera = camera,
+        .bodies = &p->bodies,
+        .is_raw = is_raw || !gn_options_get_bool(options, NULL, NULL, "steady")};
+    if (!err)
+        err = gn_tracker_create(&wanted, &p->tracker, out_error);
+    if (!err && p->dir && mkdir(p->dir, 0777) < 0 && errno != EEXIST)
+        err = gn_error_set(out_error, -errno, "cannot create the folder %s: %s", p->dir,
+                           strerror(errno));
+    if (err)
+        gn_poses_close(&p);
+    *out_poses = p;
+    return err;
+}
+
+static int draw(const struct gn_poses *p, const char *name, struct gn_error *out_error)
+{
+    char path[4096];
+    struct gn_image8 drawn = {0};
+    if (gn_tracker_draw(p->tracker, &drawn) < 0)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    int n = snprintf(path, sizeof(path), "%s/%s.png", p->dir, name);
+    int err = n < (int)sizeof(path)
+                  ? gn_png_write_file(path, &drawn, out_error)
+                  : gn_error_set(out_error, -ENAMETOOLONG, "%s: the path is too long", p->dir);
+    gn_image8_finish(&drawn);
+    return err;
+}
+
+/** One body of the last picture, as poses.jsonl has it. */
+static json_t *make_body(const struct gn_poses *p, int body)
+{
+    const struct gn_tracked_body *b = gn_tracker_get_body(p->tracker, body);
+    double m[16];
+    json_t *matrix = json_array();
+    gn_pose_to_matrix(&b->camera_from_body, m);
+    for (int i = 0; i < 16; i++)
+        json_array_append_new(matrix, json_real(m[i]));
+    return json_pack("{s:s, s:i, s:o, s:f, s:f, s:f}", "name", p->bodies.bodies[body].name,
+                     "markers", b->n_markers, "camera_from_body", matrix, "rms_px", b->fit.rms_px,
+                     "error_mm", 1e3 * b->fit.error_m, "error_rad", b->fit.error_rad);
+}
+
+static int write_line(const struct gn_poses *p, const struct gn_capture *capture, int64_t time_ns,
+                      struct gn_error *out_error)
+{
+    json_t *seen = json_array();
+    for (int i = 0; i < p->bodies.n_bodies; i++)
+        if (gn_tracker_get_body(p->tracker, i)->is_seen)
+            json_array_append_new(seen, make_body(p, i));
+    json_t *line = json_pack("{s:s, s:I, s:o}", "picture", capture->name, "time_ns",
+                             (json_int_t)time_ns, "bodies", seen);
+    char *text = line ? json_dumps(line, JSON_REAL_PRECISION(12)) : NULL;
+    json_decref(line);
+    int err = text && fprintf(p->log, "%s\n", text) > 0 && fflush(p->log) == 0
+                  ? 0
+                  : gn_error_set(out_error, -EIO, "cannot write the poses of %s", capture->name);
+    free(text);
+    return err;
+}
+
+int gn_poses_take(struct gn_poses *p, const struct gn_capture *capture, struct gn_error *out_error)
+{
+    int64_t time_ns = gn_poses_get_time_ns(capture);
+    int n_seen = gn_tracker_update(p->tracker, capture, time_ns, out_error);
+    int err = n_seen < 0 ? n_seen : 0;
+    if (!err && p->dir)
+        err = draw(p, capture->name, out_error);
+    if (!err && p->log)
+        err = write_line(p, capture, time_ns, out_error);
+    return err ? err : n_seen;
+}
+
+bool gn_poses_get_camera(const struct gn_poses *p, struct gn_pose *out_world_from_camera)
+{
+    return p->world >= 0 && gn_tracker_get_camera(p->tracker, p->world, out_world_from_camera);
+}
+
+bool gn_poses_get_body(const struct gn_poses *p, int body, struct gn_pose *out_world_from_body)
+{
+    return p->world >= 0 && gn_tracker_get_between(p->tracker, p->world, body, out_world_from_body);
+}
+
+bool gn_poses_get_in_camera(const struct gn_poses *p, int body,
+                            struct gn_pose *out_camera_from_body)
+{
+    const struct gn_tracked_body *b = gn_tracker_get_body(p->tracker, body);
+    if (b->is_seen)
+        *out_camera_from_body = b->camera_from_body;
+    return b->is_seen;
+}
+
+int gn_poses_find_body(const struct gn_poses *p, const char *name)
+{
+    return gn_bodies_find(&p->bodies, name);
+}
+
+void gn_poses_print(const struct gn_poses *p, FILE *out)
+{
+    struct gn_tracker_counts c;
+    if (!p)
+        return;
+    gn_tracker_get_counts(p->tracker, &c);
+    fprintf(out, "markers: %llu poses from %llu pictures, %.2f ms of a core each",
+            (unsigned long long)c.n_seen, (unsigned long long)c.n_pictures,
+            c.n_pictures ? 1e3 * c.time_s / (double)c.n_pictures : 0);
+    if (c.n_flips_rejected + c.n_flips_corrected > 0)
+        fprintf(out, "; %llu flips rejected, %llu corrected",
+                (unsigned long long)c.n_flips_rejected, (unsigned long long)c.n_flips_corrected);
+    if (c.n_rest > 0)
+        fprintf(out, "; at rest steps of %.3f mm RMS, %.3f as measured",
+                1e3 * sqrt(c.rest_steady_m2 / (double)c.n_rest),
+                1e3 * sqrt(c.rest_measured_m2 / (double)c.n_rest));
+    if (c.n_moving > 0)
+        fprintf(out, "; in motion %.1f ms late", 1e3 * c.moving_lag_s / (double)c.n_moving);
+    fprintf(out, "\n");
+}
+
+void gn_poses_close(struct gn_poses **poses)
+{
+    struct gn_poses *p = *poses;
+    if (!p)
+        return;
+    gn_tracker_destroy(&p->tracker);
+    gn_bodies_finish(&p->bodies);
+    if (p->log)
+        fclose(p->log);
+    free(p);
+    *poses = NULL;
+}

@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: 2026 the Gnomon authors
+# SPDX-License-Identifier: ISC
+"""gnomon view and track take poses from markers in the pictures: each frame goes with the pose of
+its own picture, one without markers comes back as it is.
+
+usage: markers.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON MARKER_SHOTS
+"""
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, sys.argv[2])
+from gnomond import *  # noqa: E402,F403
+from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
+
+GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+SHOTS = 6  # picture 3 has no marker in it
+SCENE = '{"objects": [{"mesh": "floor.obj", "role": "real"},' \
+    ' {"mesh": "cube.obj", "role": "virtual", "name": "cube", "movable": true}]}'
+CAMERA = {'width': 320, 'height': 240, 'fx': 330, 'fy': 330, 'cx': 160, 'cy': 120,
+          'distortion': [-0.15, 0.05, 0.001, -0.001, 0]}
+MARKERS = {'dictionary': '4x4_50', 'bodies': [
+    {'name': 'world', 'markers': [{'id': 7, 'size': 0.08}]},
+    {'name': 'cube', 'grids': [{'columns': 2, 'rows': 2, 'size': 0.045, 'gap': 0.01,
+                                'first_id': 20}]}]}
+
+
+class Desk:
+    """A folder with the shots, their truth, the markers' and the camera's files."""
+
+    def __init__(self):
+        self.path = tempfile.mkdtemp(prefix='gnomon-markers-test.')
+        self.write('markers.json', json.dumps(MARKERS))
+        self.write('camera.json', json.dumps(CAMERA))
+        os.mkdir(self.at('shots'))
+        out = subprocess.run([sys.argv[4], self.at('markers.json'), self.at('shots'), str(SHOTS)],
+                             check=True, capture_output=True, text=True).stdout
+        self.truth = [json.loads(line) for line in out.splitlines()]
+        with open(self.at('light.exr'), 'wb') as light:
+            light.write(exr_bytes(32, 16, (1, 1, 1)))
+
+    def at(self, name):
+        return os.path.join(self.path, name)
+
+    def write(self, name, text):
+        with open(self.at(name), 'w') as out:
+            out.write(text)
+        return self.at(name)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        shutil.rmtree(self.path)
+
+
+def gnomon(*arguments):
+    done = subprocess.run([GNOMON, *arguments], capture_output=True, text=True, timeout=200)
+    return done.returncode, done.stdout, done.stderr
+
+
+def succeed(*arguments):
+    status, out, err = gnomon(*arguments)
+    assert status == 0 and not err, (status, out, err)
+    return out
+
+
+def refuse(status, words, *arguments):
+    got, out, err = gnomon(*arguments)
+    assert got == status and err.count('\n') == 1, (got, out, err)
+    for word in words:
+        assert word in err, '%r is not in %r' % (word, err)
+
+
+def server(daemon):
+    return '--server=%s:%d' % daemon.address
+
+
+def give_light(daemon, desk):
+    succeed('probe', server(daemon), '--files', desk.at('light.exr'))
+
+
+def pixels(path):
+    return read_png(path)[2]
+
+
+def differing(a, b, codes):
+    """The share of pixels of which a channel differs by more."""
+    n = sum(max(abs(a[i + k] - b[i + k]) for k in range(3)) > codes for i in range(0, len(a), 3))
+    return n / (len(a) / 3)
+
+
+def read_poses(path):
+    with open(path) as lines:
+        return [json.loads(line) for line in lines]
+
+
+def far(a, b):
+    """Largest difference of two matrices' translations, m, and of their rotations."""
+    return (max(abs(a[i] - b[i]) for i in (3, 7, 11)),
+            max(abs(a[i] - b[i]) for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)))
+
+
+def inverse(m):
+    r = [m[4 * j + i] for i in range(3) for j in range(3)]
+    t = [-sum(r[3 * i + j] * m[4 * j + 3] for j in range(3)) for i in range(3)]
+    return [*r[0:3], t[0], *r[3:6], t[1], *r[6:9], t[2], 0, 0, 0, 1]
+
+
+def test_each_frame_has_the_pose_of_its_own_picture():
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
+        give_light(daemon, desk)
+        out = succeed('view', server(daemon), '--files', desk.at('shots'), '--camera',
+                      desk.at('camera.json'), '--markers', desk.at('markers.json'), '--no-steady',
+                      '--debug-markers', desk.at('seen'), '--out', desk.at('out'))
+        assert '%d results' % SHOTS in out and '1 frames without' in out, out
+        # What was measured is the truth of that picture: no two of them are near each other.
+        poses = read_poses(desk.at('out/poses.jsonl'))
+        assert [p['picture'] for p in poses] == ['shot-%02d' % i for i in range(SHOTS)]
+        for truth, line in zip(desk.truth, poses):
+            bodies = {b['name']: b for b in line['bodies']}
+            assert ('world' in bodies) == (not truth['empty']), line
+            if not truth['empty']:
+                off = far(inverse(bodies['world']['camera_from_body']), truth['world_from_camera'])
+                assert off[0] < 0.003 and off[1] < 0.006, (line, truth)
+                assert bodies['world']['error_mm'] < 1, line
+        assert sorted(os.listdir(desk.at('seen'))) == ['shot-%02d.png' % i for i in range(SHOTS)]
+        # And the composites are those of the true poses.
+        frames = [{'time_s': .1 * i, 'picture': 'shots/shot-%02d.png' % i,
+                   'environment': 'light.exr', 'world_from_camera': t['world_from_camera']}
+                  for i, t in enumerate(desk.truth)]
+        desk.write('sequence.json', json.dumps(
+            {'format': 'gnomon-sequence 1', 'camera': CAMERA,
+             'environment': {'projection': 'latlong'}, 'frames': frames}))
+        succeed('view', server(daemon), '--sequence', desk.path, '--out', desk.at('true'))
+        for i, truth in enumerate(desk.truth):
+            name = 'shot-%02d.png' % i
+            mine, true = pixels(desk.at('out/' + name)), pixels(desk.at('true/' + name))
+            shot = pixels(desk.at('shots/' + name))
+            if truth['empty']:
+                assert mine == shot, 'a frame without a marker did not come back as it was'
+                continue
+            assert differing(true, shot, 24) > 0.02, 'the cube is not in picture %d' % i
+            share = differing(mine, true, 24)
+            assert share < 0.01, 'picture %d: %.4f of its pixels are of another pose' % (i, share)
+
+
+def test_a_short_text_and_steady_poses():
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
+        give_light(daemon, desk)
+        out = succeed('view', server(daemon), '--files', desk.at('shots/shot-00.png'), '--loop',
+                      '--count', '4', '--rate', '50', '--camera', desk.at('camera.json'),
+                      '--marker', '4x4_50:7:0.08', '--out', desk.at('out'))
+        assert '4 poses from 4 pictures' in out and 'at rest' in out, out
+        for line in read_poses(desk.at('out/poses.jsonl')):
+            body, = line['bodies']
+            off = far(inverse(body['camera_from_body']), desk.truth[0]['world_from_camera'])
+            assert off[0] < 0.003, (off, line)
+
+
+def test_an_object_follows_its_markers():
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk, Viewer(daemon) as viewer, \
+            Client(daemon, pb.ROLE_TRACKER) as hand:
+        give_light(daemon, desk)
+
+        def look():
+            _, payload = viewer.expect_result(viewer.send_frame(lighting_wait_ms=60000))
+            return {i for i in range(len(payload) // 3)
+                    if payload[3 * i:3 * i + 3] != b'\x80\x80\x80'}
+
+        before = look()
+        out = succeed('track', server(daemon), '--object', 'cube', '--files', desk.at('shots'),
+                      '--camera', desk.at('camera.json'), '--markers', desk.at('markers.json'),
+                      '--no-steady', '--rate', '50')
+        assert '%d poses sent of %d pictures' % (SHOTS - 1, SHOTS) in out, out
+        followed = look()
+        m = desk.truth[SHOTS - 1]['world_from_object']
+        angle = .2 * (SHOTS - 1)  # about z, as marker_shots turns it
+        where = pb.Transform(orientation=[math.cos(angle / 2), 0, 0, math.sin(angle / 2)],
+                             position_m=[m[3], m[7], m[11]])
+        hand.send(POSE, pb.Pose(object='cube', world_from_object=where,
+                                time_ns=time.monotonic_ns()))
+        deadline = time.monotonic() + 60
+        while json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['poses_in'] < SHOTS:
+            assert time.monotonic() < deadline
+            time.sleep(.02)
+        true = look()
+        assert len(before ^ true) > 8, 'the object has not moved'
+        assert len(followed ^ true) <= max(2, len(before ^ true) // 10), (
+            len(followed ^ true), len(before ^ true))
+
+
+def test_what_is_wrong_is_said():
+    with Desk() as desk:
+        files = ['--files', desk.at('shots'), '--camera', desk.at('camera.json')]
+        view = ['view', *files, '--out', desk.at('out')]
+        refuse(1, ['ID from 0 to 49'], *view, '--marker', '4x4_50:77:0.05')
+        refuse(1, ['apriltag_36h11'], *view, '--marker', 'aruco:7:0.05')
+        refuse(1, ['gone.json'], *view, '--markers', desk.at('gone.json'))
+        refuse(2, ['--markers'], *view, '--markers', 'a', '--marker', '4x4_50:7:0.05')
+        refuse(2, ['--markers'], *view, '--no-steady')
+        path = desk.write('no-world.json', json.dumps(
+            {'dictionary': '4x4_50', 'bodies': [{'name': 'a', 'markers': [{'id': 1, 'size': 1}]}]}))
+        refuse(1, ['"world"', 'no-world.json'], *view, '--markers', path)
+        track = ['track', *files, '--object', 'cup']
+        refuse(2, ['--markers'], *track)
+        refuse(1, ['"cup"', 'markers.json'], *track, '--markers', desk.at('markers.json'))
+        refuse(1, ['world_from_camera'], 'track', *files, '--object', 'a', '--markers', path)
+        # Pictures of another size than the camera's.
+        with open(desk.at('shots/small.png'), 'wb') as small:
+            small.write(png_bytes(8, 8, bytes(192)))
+        with Daemon(rooms=Room(scene=SCENE)) as daemon:
+            refuse(1, ['8x8', '320x240'], 'track', server(daemon), '--object', 'cube', '--files',
+                   desk.at('shots/small.png'), '--camera', desk.at('camera.json'), '--markers',
+                   desk.at('markers.json'))
+
+
+run_tests([test_each_frame_has_the_pose_of_its_own_picture, test_a_short_text_and_steady_poses,
+           test_an_object_follows_its_markers, test_what_is_wrong_is_said])
