@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "client/track/edges.h"
+#include "client/track/follow.h"
 #include "client/track/grey.h"
 #include "client/track/pose_choice.h"
 #include "client/vision/markers.h"
@@ -20,8 +21,15 @@ enum {
     SEARCH_INTERVAL = 15,
 };
 
-/** Below this speed of its answer a body counts as at rest, m/s. */
-static const double rest_speed = 0.005;
+/** Below these speeds of its answer a body counts as at rest, m/s and rad/s. */
+static const double rest_speed = 0.005, rest_turn = 0.02;
+
+/** A marker of the last picture. */
+struct followed {
+    struct gn_marker_sighting sighting;
+    double step[4][2]; // how its corners moved since the picture before, px
+    uint8_t white[GN_MARKER_MAX_CELLS * GN_MARKER_MAX_CELLS];
+};
 
 /** What is kept of each body from picture to picture. */
 struct memory {
@@ -43,8 +51,10 @@ struct gn_tracker {
     bool has_picture;
     int since_whole; // pictures since all of one was searched
     struct gn_marker_window window;
-    int n_sightings, n_last;
+    int n_sightings;
     struct gn_marker_sighting sightings[MAX_SIGHTINGS];
+    int n_last;
+    struct followed last[MAX_SIGHTINGS], next[MAX_SIGHTINGS];
     struct memory memory[GN_BODY_MAX_BODIES];
     struct gn_tracked_body tracked[GN_BODY_MAX_BODIES];
     double (*points)[3]; // [GN_BODY_MAX_MARKERS * 4], as are:
@@ -165,16 +175,28 @@ static void set_window(struct gn_tracker *t)
                                           .height = (int)(high[1] - low[1] + 2 * around)};
 }
 
-/**
- * Finds the markers: near where the last picture had them, and everywhere where that finds fewer
- * than it did, or now and then where some have been missing.
- */
-static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
+/** Follows every marker of the last picture. False where one is not where it should be. */
+static bool follow_markers(struct gn_tracker *t)
 {
-    int n_known = 0, err = 0;
-    for (int i = 0; i < t->bodies->n_bodies; i++)
-        n_known += t->bodies->bodies[i].n_markers;
-    bool is_near = t->n_last > 0 && (t->n_last == n_known || t->since_whole < SEARCH_INTERVAL);
+    for (int i = 0; i < t->n_last; i++) {
+        struct gn_marker_sighting *s = &t->sightings[i];
+        const struct followed *f = &t->last[i];
+        const struct gn_follow_pattern pattern = {.cells = t->cells, .white = f->white};
+        *s = f->sighting;
+        for (int k = 0; k < 4; k++)
+            for (int a = 0; a < 2; a++)
+                s->corners[k][a] += f->step[k][a];
+        if (!gn_follow_marker(&t->grey, &t->camera, &pattern, s->corners))
+            return false;
+    }
+    t->n_sightings = t->n_last;
+    return t->n_last > 0;
+}
+
+/** Searches near where the last picture had markers, and everywhere where that finds fewer. */
+static int search_markers(struct gn_tracker *t, bool is_near, struct gn_error *out_error)
+{
+    int err = 0;
     t->n_sightings = 0;
     if (is_near)
         err = search(t, &t->window, out_error);
@@ -182,13 +204,8 @@ static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
         err = search(t, NULL, out_error);
         t->since_whole = 0;
         t->counts.n_searched_whole++;
-    } else {
-        t->since_whole++;
     }
-    t->n_last = err ? 0 : t->n_sightings;
-    if (t->n_last > 0)
-        set_window(t);
-    for (int i = 0; i < t->n_sightings; i++) {
+    for (int i = 0; i < t->n_sightings && !err; i++) {
         if (!gn_edges_refine(&t->grey, &t->camera, t->cells, t->sightings[i].corners)) {
             gn_edges_widen(t->sightings[i].corners, 0.5);
             t->counts.n_coarse_corners++;
@@ -197,24 +214,78 @@ static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
     return err;
 }
 
+/** Keeps the sightings for following them into the next picture. */
+static void remember(struct gn_tracker *t)
+{
+    struct followed *next = t->next;
+    for (int i = 0; i < t->n_sightings; i++) {
+        const struct followed *before = NULL;
+        for (int k = 0; k < t->n_last && !before; k++)
+            if (t->last[k].sighting.id == t->sightings[i].id)
+                before = &t->last[k];
+        next[i] = (struct followed){.sighting = t->sightings[i]};
+        if (!before) {
+            (void)gn_marker_get_cells(t->bodies->dictionary, t->sightings[i].id, next[i].white);
+            continue;
+        }
+        memcpy(next[i].white, before->white, sizeof(next[i].white));
+        for (int k = 0; k < 8; k++)
+            next[i].step[k / 2][k % 2] =
+                t->sightings[i].corners[k / 2][k % 2] - before->sighting.corners[k / 2][k % 2];
+    }
+    memcpy(t->last, next, (size_t)t->n_sightings * sizeof(*next));
+    t->n_last = t->n_sightings;
+    if (t->n_last > 0)
+        set_window(t);
+}
+
+/**
+ * Finds the markers: follows those of the last picture; else searches near them; else everywhere,
+ * as now and then where some of the bodies' markers have been missing.
+ */
+static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
+{
+    int n_known = 0, err = 0;
+    for (int i = 0; i < t->bodies->n_bodies; i++)
+        n_known += t->bodies->bodies[i].n_markers;
+    bool is_near = t->n_last > 0 && (t->n_last == n_known || t->since_whole < SEARCH_INTERVAL);
+    t->since_whole++;
+    if (is_near && follow_markers(t))
+        t->counts.n_followed++;
+    else
+        err = search_markers(t, is_near, out_error);
+    if (err)
+        t->n_sightings = 0;
+    remember(t);
+    return err;
+}
+
+static double get_length(const double v[static 3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
 /** How still and how late the answers are. */
 static void count_step(struct gn_tracker *t, struct memory *m, const struct gn_tracked_body *b)
 {
-    const double *v = m->filter.speed;
+    const struct gn_pose_filter *f = &m->filter;
     if (m->was_seen && !t->is_raw) {
+        bool is_moving = get_length(f->speed) > rest_speed,
+             is_turning = get_length(f->turn) > rest_turn;
         double measured_m2 = 0, steady_m2 = 0;
         for (int k = 0; k < 3; k++) {
             measured_m2 +=
                 pow(b->fit.camera_from_body.translation[k] - m->last_measured.translation[k], 2);
             steady_m2 += pow(b->camera_from_body.translation[k] - m->last_steady.translation[k], 2);
         }
-        if (sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) < rest_speed) {
+        if (is_moving || is_turning) {
+            t->counts.n_moving++;
+            t->counts.moving_lag_s +=
+                fmax(is_moving ? f->lag_s : 0, is_turning ? f->turn_lag_s : 0);
+        } else {
             t->counts.n_rest++;
             t->counts.rest_measured_m2 += measured_m2;
             t->counts.rest_steady_m2 += steady_m2;
-        } else {
-            t->counts.n_moving++;
-            t->counts.moving_lag_s += m->filter.lag_s;
         }
     }
     m->was_seen = true;

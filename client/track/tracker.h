@@ -43,6 +43,7 @@ struct gn_tracked_body {
 struct gn_tracker_counts {
     uint64_t n_pictures;
     uint64_t n_seen;           // body times picture
+    uint64_t n_followed;       // pictures that were not searched: see follow.h
     uint64_t n_searched_whole; // pictures in which more than the bodies' surroundings was searched
     uint64_t n_coarse_corners; // markers whose edges could not be refined: OpenCV's corners
     uint64_t n_flips_rejected; // see pose_choice.h

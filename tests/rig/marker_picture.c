@@ -120,16 +120,20 @@ static double get_mean(const struct placed *sheets, int n_sheets, const double *
 /** One pass of the normal point spread along x (step 1) or y (step width). */
 static void blur_line(const float *in, float *out, int n, long step, double deviation)
 {
-    int reach = (int)ceil(4 * deviation);
+    enum { MAX_REACH = 40 };
+    double weight[MAX_REACH + 1], whole = 0;
+    int reach = (int)fmin(MAX_REACH, ceil(4 * deviation));
+    for (int k = 0; k <= reach; k++) {
+        weight[k] = exp(-0.5 * k * k / (deviation * deviation));
+        whole += k ? 2 * weight[k] : weight[k];
+    }
     for (int i = 0; i < n; i++) {
-        double sum = 0, weights = 0;
+        double sum = 0;
         for (int k = -reach; k <= reach; k++) {
             int at = i + k < 0 ? 0 : i + k >= n ? n - 1 : i + k;
-            double weight = exp(-0.5 * k * k / (deviation * deviation));
-            sum += weight * (double)in[at * step];
-            weights += weight;
+            sum += weight[abs(k)] * (double)in[at * step];
         }
-        out[i * step] = (float)(sum / weights);
+        out[i * step] = (float)(sum / whole);
     }
 }
 
