@@ -21,7 +21,7 @@ sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = sys.argv[3]
 WIDTH, HEIGHT, FRAMES = 64, 48, 6
 CAMERA_JSON = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH / 2, 'fy': WIDTH / 2, 'cx': WIDTH / 2,
                'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],
@@ -213,8 +213,8 @@ def test_to_the_bit():
         for i in range(2):
             again = folder.at('again%d' % i)
             with open_room() as daemon:
-                replay(daemon, folder, '--expect-equal', '--out', again, '--record',
-                       again + '.gnr').succeed('%d composites equal to the bit' % FRAMES)
+                out = replay(daemon, folder, '--expect-equal', '--out', again, '--record',
+                             again + '.gnr').succeed('%d composites equal to the bit' % FRAMES)
             streams = os.listdir(again)
             assert len(streams) == 1, streams
             assert get_composites(os.path.join(again, streams[0])) == first
@@ -232,11 +232,11 @@ def test_to_the_bit():
                     assert old[1] == new[1], (old[1], new[1])
             # What lay between two captures of one stream lies between them still.
             assert len(shifts) == 2, shifts
-            # And they go when they went, within what a busy machine is late.
+            # And they go when they went, where the machine was not kept from it.
             frames = [[m[3] for m in sent[pb.ROLE_VIEWER] if m[0] == FRAME] for sent in (then, now)]
             for k in range(FRAMES):
                 off = (frames[1][k] - frames[1][0]) - (frames[0][k] - frames[0][0])
-                assert abs(off) < 300e6, off
+                assert abs(off) < 300e6 or 'behind schedule' in out, off
 
 
 def test_paces():
@@ -364,7 +364,7 @@ def test_hostile_files():
         replay(daemon, folder, recording=folder.at('none')).fail(1, 'No such file')
         # Cut in the middle: what is there is replayed, and what is missing is said.
         cut = folder.write('cut', data[:len(data) // 2])
-        replay(daemon, folder, '--as-fast-as-possible', recording=cut).succeed('the file is cut: ', ', 0 not')
+        replay(daemon, folder, '--as-fast-as-possible', recording=cut).succeed('the file is cut: ', ' frames, ')
         status, out, _ = Run('replay', '--info', cut).end()
         assert status == 1 and 'bytes are missing' in out, out
         # Noise in the middle: what is left around it.

@@ -17,7 +17,7 @@ sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, read_png  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = sys.argv[3]
 WIDTH, HEIGHT, N = 64, 48, 5
 CAMERA_JSON = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH / 2, 'fy': WIDTH / 2, 'cx': WIDTH / 2,
                'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],

@@ -433,6 +433,56 @@ static void test_killed_writers(void **state)
     gn_recording_reader_close(&reader);
 }
 
+/* Several processes at once: every record of each is there, whole and in its order. */
+static void test_writers_at_once(void **state)
+{
+    (void)state;
+    enum { N_WRITERS = 4, N_RECORDS = 2000 };
+    int start[2];
+    unlink(path);
+    pid_t children[N_WRITERS];
+    assert_int_equal(pipe(start), 0);
+    for (int i = 0; i < N_WRITERS; i++) {
+        children[i] = fork();
+        assert_true(children[i] >= 0);
+        if (children[i] > 0)
+            continue;
+        struct gn_recording_writer *writer = NULL;
+        uint8_t body[MAX_BODY];
+        close(start[1]);
+        if (read(start[0], body, 1) != 0) // until all are there
+            _exit(1);
+        int err = gn_recording_writer_open(path, 0, &writer, NULL);
+        for (int k = 0; !err && k < N_RECORDS; k++) {
+            memset(body, k, sizeof(body));
+            const struct gn_recording_part part = {body, (size_t)(1 + k % MAX_BODY)};
+            err = gn_recording_writer_put(writer, GN_RECORDING_SENT, 0, &part, 1, NULL);
+        }
+        _exit(err != 0);
+    }
+    close(start[0]);
+    close(start[1]);
+    for (int i = 0; i < N_WRITERS; i++) {
+        int status;
+        assert_int_equal(waitpid(children[i], &status, 0), children[i]);
+        assert_int_equal(status, 0);
+    }
+    struct gn_recording_reader *reader = NULL;
+    struct gn_recording_record record;
+    uint32_t next[N_WRITERS + 1] = {0};
+    assert_int_equal(gn_recording_reader_open(path, &reader, NULL), 0);
+    while (gn_recording_reader_next(reader, &record, NULL) > 0) {
+        assert_in_range(record.stream, 1, N_WRITERS);
+        uint32_t k = next[record.stream]++;
+        assert_true(record.bytes == 1 + k % MAX_BODY && record.body[0] == (uint8_t)k);
+    }
+    for (int i = 1; i <= N_WRITERS; i++)
+        assert_int_equal(next[i], N_RECORDS);
+    struct gn_recording_damage damage = gn_recording_reader_get_damage(reader);
+    assert_true(damage.n_damaged + damage.missing_bytes + damage.tail_bytes == 0);
+    gn_recording_reader_close(&reader);
+}
+
 /* A file that can grow no further keeps what it has, and takes more once there is room. */
 static void test_no_room(void **state)
 {
@@ -635,12 +685,13 @@ static void test_hostile_messages(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),     cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_flipped_bits),   cmocka_unit_test(test_hostile_heads),
-        cmocka_unit_test(test_other_files),    cmocka_unit_test(test_unknown_kind),
-        cmocka_unit_test(test_killed_writers), cmocka_unit_test(test_no_room),
-        cmocka_unit_test(test_held_lock),      cmocka_unit_test(test_set_field),
-        cmocka_unit_test(test_field_numbers),  cmocka_unit_test(test_hostile_messages),
+        cmocka_unit_test(test_round_trip),       cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_flipped_bits),     cmocka_unit_test(test_hostile_heads),
+        cmocka_unit_test(test_other_files),      cmocka_unit_test(test_unknown_kind),
+        cmocka_unit_test(test_killed_writers),   cmocka_unit_test(test_writers_at_once),
+        cmocka_unit_test(test_no_room),          cmocka_unit_test(test_held_lock),
+        cmocka_unit_test(test_set_field),        cmocka_unit_test(test_field_numbers),
+        cmocka_unit_test(test_hostile_messages),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
