@@ -462,7 +462,7 @@ def test_usage():
     """Wrong command lines: status 2, one line that says what is right."""
     for arguments, words in (
             (['probes'], ["did you mean 'probe'"]), (['fly'], ['--help lists them']),
-            (['probe'], ['--sequence DIR, --files PATTERN or a camera']),
+            (['probe'], ['--sequence DIR, --files PATTERN, --video FILE or a camera']),
             (['probe', '--files', 'a', '--sequence', 'b'], ['one of them']),
             (['probe', '--files', 'a', '--setup', 'b', '--projection', 'angular'], ['one of them']),
             (['probe', '--files', 'a', '--rate', '0'], ['--rate', '0.001']),

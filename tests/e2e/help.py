@@ -12,7 +12,8 @@ GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 SERVER = {'server', 'room', 'token'}
 CONNECT = SERVER | {'record', 'record-max'}
 FEED = {'sequence', 'files', 'video', 'rate', 'start-at', 'loop', 'count'}
-LIVE = {'gige', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format'}
+LIVE = {'gige', 'v4l2', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format', 'controls',
+        'lock-white-balance'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
     ([GNOMON, 'probe'], CONNECT | FEED | LIVE | {'setup', 'projection', 'first-sequence'}),
@@ -58,7 +59,7 @@ def check_options(command, wanted):
     name = ' '.join([command[0].rsplit('/', 1)[1]] + command[1:])
     assert text.startswith('Usage: %s ' % name), text.splitlines()[0]
     lines = text.splitlines()
-    listed = [(i, re.match(r'  --([a-zA-Z.-]+)', line)) for i, line in enumerate(lines)]
+    listed = [(i, re.match(r'  --([a-zA-Z0-9.-]+)', line)) for i, line in enumerate(lines)]
     listed = [(i, m.group(1)) for i, m in listed if m]
     names = [n for _, n in listed]
     assert len(set(names)) == len(names), 'twice: %s' % sorted(n for n in names if names.count(n) > 1)
