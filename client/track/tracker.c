@@ -8,6 +8,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "client/track/axes.h"
 #include "client/track/edges.h"
 #include "client/track/follow.h"
 #include "client/track/grey.h"
@@ -403,45 +404,14 @@ void gn_tracker_get_counts(const struct gn_tracker *t, struct gn_tracker_counts 
     *out = t->counts;
 }
 
-/** A line of 2 px. */
-static void draw_line(struct gn_image8 *image, const double from[static 2],
-                      const double to[static 2], const uint8_t colour[static 3])
+/** How far the body's first corners are from its origin: as long its axes are drawn. */
+static double get_reach(const struct gn_body *body)
 {
-    double length = hypot(to[0] - from[0], to[1] - from[1]);
-    int n = (int)fmin(2 * length + 1, 1e5);
-    for (int i = 0; i <= n; i++) {
-        double t = (double)i / n;
-        for (int k = 0; k < 4; k++) {
-            double x = (1 - t) * from[0] + t * to[0] + (k & 1) - 0.5;
-            double y = (1 - t) * from[1] + t * to[1] + (k >> 1) - 0.5;
-            if (x >= 0 && y >= 0 && x < image->width && y < image->height)
-                memcpy(gn_image8_at(image, (int)x, (int)y), colour, 3);
-        }
-    }
-}
-
-static void draw_axes(const struct gn_tracker *t, int body, struct gn_image8 *image)
-{
-    const struct gn_body *known = &t->bodies->bodies[body];
-    const struct gn_pose *pose = &t->tracked[body].camera_from_body;
     double reach = 0;
-    for (int i = 0; i < known->n_markers; i++)
+    for (int i = 0; i < body->n_markers; i++)
         for (int k = 0; k < 3; k++)
-            reach = fmax(reach, fabs(known->markers[i].corners_body[0][k]));
-    const double origin[3] = {0};
-    double centre[3], middle[2], end[2];
-    gn_pose_transform(pose, origin, centre);
-    if (!gn_camera_project(&t->camera, centre, middle))
-        return;
-    for (int axis = 0; axis < 3; axis++) {
-        double tip[3] = {0};
-        uint8_t colour[3] = {30, 30, 30};
-        tip[axis] = reach;
-        colour[axis] = 255;
-        gn_pose_transform(pose, tip, tip);
-        if (gn_camera_project(&t->camera, tip, end))
-            draw_line(image, middle, end, colour);
-    }
+            reach = fmax(reach, fabs(body->markers[i].corners_body[0][k]));
+    return reach;
 }
 
 int gn_tracker_draw(const struct gn_tracker *t, struct gn_image8 *out_rgb)
@@ -457,10 +427,11 @@ int gn_tracker_draw(const struct gn_tracker *t, struct gn_image8 *out_rgb)
         out_rgb->data[i] = t->grey.pixels[i / 3];
     for (int i = 0; i < t->n_sightings; i++)
         for (int k = 0; k < 4; k++)
-            draw_line(out_rgb, t->sightings[i].corners[k], t->sightings[i].corners[(k + 1) % 4],
-                      outline);
+            gn_axes_draw_line(out_rgb, t->sightings[i].corners[k],
+                              t->sightings[i].corners[(k + 1) % 4], outline);
     for (int i = 0; i < t->bodies->n_bodies; i++)
         if (t->tracked[i].is_seen)
-            draw_axes(t, i, out_rgb);
+            gn_axes_draw(out_rgb, &t->camera, &t->tracked[i].camera_from_body,
+                         get_reach(&t->bodies->bodies[i]));
     return 0;
 }

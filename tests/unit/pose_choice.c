@@ -97,6 +97,48 @@ static void fits_exact_points_exactly(void **state)
     }
 }
 
+/** The sum of squared distances in the picture, by the camera's own projection. */
+static double sum_squares(const struct gn_camera *camera, const struct gn_pose *pose,
+                          double seen[4][2])
+{
+    double sum = 0;
+    for (int i = 0; i < 4; i++) {
+        double p[3], px[2];
+        gn_pose_transform(pose, square[i], p);
+        assert_true(gn_camera_project(camera, p, px));
+        sum += pow(px[0] - seen[i][0], 2) + pow(px[1] - seen[i][1], 2);
+    }
+    return sum;
+}
+
+static void no_pose_near_the_answer_fits_better(void **state)
+{
+    (void)state;
+    if (!gn_vision_is_built())
+        return;
+    struct gn_camera camera = get_camera();
+    for (int i = 0; i < 100; i++) {
+        struct gn_pose pose = get_pose(0.3 + 0.6 * draw(), 2 * pi * draw(), 0.3 + 0.2 * draw());
+        struct gn_pose_fit fits[2];
+        double seen[4][2];
+        see(&camera, &pose, square, 4, 0.3, seen);
+        int n = gn_pose_fit_points(&camera, square, (const double(*)[2])seen, 4, 0.3, fits, NULL);
+        assert_in_range(n, 1, 2);
+        double best = sum_squares(&camera, &fits[0].camera_from_body, seen);
+        assert_true(fabs(best - fits[0].sum_px2) < 0.01 * best + 1e-6);
+        for (int k = 0; k < 12; k++) {
+            struct gn_pose near = fits[0].camera_from_body;
+            double turn[3] = {0}, by = k % 2 ? 1 : -1;
+            if (k < 6)
+                near.translation[k / 2] += by * 2e-4;
+            else
+                turn[k / 2 - 3] = by * 5e-3;
+            gn_rotation_turn(near.rotation, turn);
+            assert_true(sum_squares(&camera, &near, seen) > best);
+        }
+    }
+}
+
 static void the_expected_error_is_the_one_that_comes(void **state)
 {
     (void)state;
@@ -215,6 +257,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_exact_points_exactly),
+        cmocka_unit_test(no_pose_near_the_answer_fits_better),
         cmocka_unit_test(the_expected_error_is_the_one_that_comes),
         cmocka_unit_test(points_that_tell_nothing_give_no_pose),
         cmocka_unit_test(flips_are_rejected),
