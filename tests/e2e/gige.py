@@ -281,7 +281,11 @@ def test_hostile():
     with Daemon() as daemon, Folder() as folder:
         for fault in ('size', 'format', 'truncated'):
             with Camera(*size(), '--fault', fault):
+                before = daemon.read_log().count(' as probe')
                 lamp = probe(daemon, folder, '--frame-rate', '50')
+                while daemon.read_log().count(' as probe') == before:
+                    assert lamp.process.poll() is None, lamp.read_err()
+                    time.sleep(0.02)
                 time.sleep(0.7)
                 out, _ = lamp.interrupt()
                 count = re.search(r'camera: 0 whole pictures, (\d+) incomplete', out)

@@ -435,10 +435,10 @@ static void run(struct camera *c)
             uint32_t period_us =
                 read_register(c, ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US);
             send_frame(c);
-            c->next_ns += period_us * GN_NS_PER_US;
-            // Where the machine stood still, what was missed is not made up for in a burst.
-            if (c->next_ns < gn_clock_get_monotonic_ns())
-                c->next_ns = gn_clock_get_monotonic_ns() + period_us * GN_NS_PER_US;
+            // Where the machine stood still, what was missed is left out, not sent in a burst.
+            do {
+                c->next_ns += (period_us ? period_us : 1) * GN_NS_PER_US;
+            } while (c->next_ns < gn_clock_get_monotonic_ns());
         }
     }
     printf("%llu frames, %lu packets, %lu lost, %lu requests, %lu sent again\n",

@@ -5,7 +5,8 @@ composites judged against the rig's truth. TAP on stdout.
 
 usage: live.py GNOMON_RIG GNOMOND GNOMON FAKE_GIGE WORK_FOLDER
 
-One camera is the fisheye and sends 12-bit log codes, the other looks at the table. Twice: as who
+One camera is the fisheye and sends 12-bit log codes, the other looks at the table, and the marker
+there says from where. Twice: as who
 runs the tests, and without any right (packets then come through ordinary sockets). In the middle the
 fisheye is killed and comes back: environment frames flow again within 2 s, and neither the viewer
 nor the daemon notices. The last composite must be as near to the truth as the limits of truth.py
@@ -28,6 +29,7 @@ import own_network  # noqa: E402
 LIMIT = 2.0  # 8-bit codes, mean absolute
 SHARE = 0.2  # of the untouched frame's error
 WIDTH, HEIGHT = 320, 240
+MARKER = '4x4_50:0:0.08'  # printed on the rig's table, at the world's origin
 RIG, GNOMOND, GNOMON, FAKE, WORK = sys.argv[1:6]
 
 
@@ -115,7 +117,7 @@ def play(stage, before):
     frame, probe = root['frames'][-1], root['environment']
     setup = save(os.path.join(folder, 'setup.json'), probe)
     camera = save(os.path.join(folder, 'camera.json'),
-                  dict(root['camera'], world_from_camera=frame['world_from_camera']))
+                  root['camera'])  # where it is, the marker says
     config = os.path.join(folder, 'gnomond.conf')
     with open(config, 'w', encoding='utf-8') as f:
         f.write('[room demo]\nscene = %s\n' % os.path.join(stage.sequence, root['scene']))
@@ -135,7 +137,8 @@ def play(stage, before):
                        setup, '--pixel-format', 'RGB12', '--frame-rate', '10')
     lamp.wait_for('^environment frame 3:')
     viewer = stage.start('view', *before, GNOMON, 'view', server, '--gige', '127.0.0.2', '--camera',
-                         camera, '--out', out, '--pixel-format', 'RGB8', '--frame-rate', '10')
+                         camera, '--marker', MARKER, '--out', out, '--pixel-format', 'RGB8',
+                         '--frame-rate', '10')
     viewer.wait_for('^frame 5:')
 
     eye.end(signal.SIGKILL)
