@@ -140,13 +140,22 @@ SESSION = {}  # the recording and composites of the session that most tests repl
 
 def record(folder):
     """Puts a recorded session of probe and viewer into the folder: the same one for all tests."""
-    if not SESSION:
+    for _ in range(5):
+        if SESSION:
+            break
         with open_room() as daemon:
             lamp, viewer = begin(daemon, folder)
             viewer.succeed()
             lamp.succeed()
-        SESSION['recording'] = open(folder.recording, 'rb').read()
-        SESSION['composites'] = get_composites(folder.at('out'))
+        with open(folder.at('out/view.json')) as report:
+            lights = [f['receipt']['lighting_sequence'] for f in json.load(report)['frames']]
+        # A machine that stood still lets environment frames replace each other: not to the bit.
+        if lights == list(range(1, FRAMES + 1)):
+            SESSION['recording'] = open(folder.recording, 'rb').read()
+            SESSION['composites'] = get_composites(folder.at('out'))
+        else:
+            os.remove(folder.recording)
+    assert SESSION, 'this machine is too busy to record in step'
     folder.write(folder.recording, SESSION['recording'])
 
 
@@ -175,6 +184,12 @@ def read_recording(path):
         records.append((kind, stream, when, body))
         at += 32 + size
     return records
+
+
+def get_begin(path):
+    """When a recording began, CLOCK_MONOTONIC."""
+    with open(path, 'rb') as recording:
+        return struct.unpack_from('<q', recording.read(40), 32)[0]
 
 
 def split(message):
@@ -227,6 +242,9 @@ def test_to_the_bit():
                 for old, new in zip(then[role], now[role]):
                     assert old[0] == new[0] and old[2] == new[2], 'another payload'
                     if hasattr(old[1], 'capture_time_ns'):
+                        # Captured now, not then; one machine, one clock.
+                        age = get_begin(again + '.gnr') + new[3] - new[1].capture_time_ns
+                        assert -1e6 <= age < 1e9 or 'behind schedule' in out, age
                         shifts.add((role, new[1].capture_time_ns - old[1].capture_time_ns))
                         new[1].capture_time_ns = old[1].capture_time_ns
                     assert old[1] == new[1], (old[1], new[1])
@@ -245,14 +263,20 @@ def test_paces():
         record(folder)
         times = [when for _, _, when, _ in read_recording(folder.recording)]
         length = (max(times) - min(times)) * 1e-9
-        assert length > .9, length
-        for more, least, most in ((('--as-fast-as-possible',), 0, .9),
-                                  (('--rate-factor', '.5'), 2 * length, 9),
-                                  (('--pin-light', '--rate-factor', '2'), .5 * length, 9)):
-            with open_room() as daemon:
-                start = time.monotonic()
-                replay(daemon, folder, '--expect-equal', *more).succeed()
-                assert least <= time.monotonic() - start <= most, (more, time.monotonic() - start)
+        assert length > .5, length
+        for more, least, most in ((('--as-fast-as-possible',), 0, length),
+                                  (('--rate-factor', '.5'), 2 * length, None),
+                                  (('--pin-light', '--rate-factor', '2'), .5 * length, None)):
+            for attempt in range(3):  # a busy machine may make it slow, not fast
+                with open_room() as daemon:
+                    start = time.monotonic()
+                    replay(daemon, folder, '--expect-equal', *more).succeed()
+                    took = time.monotonic() - start
+                assert took >= least, (more, took)
+                if most is None or took < most:
+                    break
+            else:
+                raise AssertionError((more, took))
         with open_room() as daemon:
             loop = replay(daemon, folder, '--loop', '--rate-factor', '5')
             time.sleep(1.5)
