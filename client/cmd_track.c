@@ -81,8 +81,8 @@ static const struct gn_program program = {
     .notes = "Examples:\n"
              "  gnomon track --object teapot --orbit 0.2\n"
              "  gnomon track --object teapot --poses path.jsonl --rate 60\n"
-             "  gnomon track --object teapot --markers markers.json --camera camera.json --gige "
-             "any\n",
+             "  gnomon track --object teapot --markers markers.json --camera camera.json \\\n"
+             "      --gige any\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };

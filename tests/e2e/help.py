@@ -14,12 +14,14 @@ CONNECT = SERVER | {'record', 'record-max'}
 FEED = {'sequence', 'files', 'video', 'rate', 'start-at', 'loop', 'count'}
 LIVE = {'gige', 'v4l2', 'frame-size', 'frame-rate', 'exposure-us', 'gain', 'pixel-format', 'controls',
         'lock-white-balance'}
+MARKERS = {'marker', 'markers', 'steady', 'debug-markers'}
 # What users and tools rely on. A star: there may be more.
 OPTIONS = [
     ([GNOMON, 'probe'], CONNECT | FEED | LIVE | {'setup', 'projection', 'first-sequence'}),
-    ([GNOMON, 'track'], CONNECT | {'object', 'poses', 'orbit', 'rate', 'count'}),
+    ([GNOMON, 'track'], CONNECT | (FEED - {'sequence'}) | LIVE | MARKERS |
+     {'object', 'poses', 'orbit', 'camera', 'predict-ms'}),
     ([GNOMON, 'screen'], CONNECT | (FEED - {'sequence'}) | {'stream', 'scale'}),
-    ([GNOMON, 'view'], CONNECT | FEED | LIVE | {'camera', 'out', 'result', 'jpeg-quality',
+    ([GNOMON, 'view'], CONNECT | FEED | LIVE | MARKERS | {'camera', 'out', 'result', 'jpeg-quality',
                                                   'quality', 'budget-ms', 'outstanding',
                                                   'match', 'sync-light', 'window', 'show'}),
     ([GNOMON, 'replay'], CONNECT | {'info', 'streams', 'rate-factor', 'as-fast-as-possible',
