@@ -522,6 +522,7 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
 static int run_stock(const char *serial, const char *genicam)
 {
     ArvGvFakeCamera *camera = arv_gv_fake_camera_new_full("lo", serial, genicam);
+    unlink(genicam);
     if (!camera || !arv_gv_fake_camera_is_running(camera))
         return -EADDRINUSE;
     arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), fill, NULL);
@@ -541,6 +542,7 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     static struct camera c;
     c.fake =
         arv_fake_camera_new_full(gn_options_get_string(options, NULL, NULL, "serial"), genicam);
+    unlink(genicam); // it is read; who kills this program leaves nothing behind
     c.fault = (enum fault)gn_options_get_enum(options, NULL, NULL, "fault");
     c.loss = gn_options_get_double(options, NULL, NULL, "loss");
     c.step_s = gn_options_get_double(options, NULL, NULL, "step-s");
@@ -592,8 +594,6 @@ int main(int argc, char *argv[])
     }
     if (err)
         fprintf(stderr, "gnomon-fake-gige: %s\n", error.text);
-    if (genicam)
-        unlink(genicam);
     gn_options_destroy(&options);
     return err ? 1 : 0;
 }
