@@ -387,8 +387,8 @@ static int report(struct gn_feed *r, int err, const struct gn_error *error)
                v->latency_sum_ms / (double)v->n_results, v->latency_max_ms);
     gn_feed_print_shift(r);
     if (v->n_reconnected > 0)
-        printf("; connected again %d time%s, %ld frames lost", v->n_reconnected,
-               v->n_reconnected == 1 ? "" : "s", v->n_lost);
+        printf("; connected again %d time%s, %ld frame%s lost", v->n_reconnected,
+               v->n_reconnected == 1 ? "" : "s", v->n_lost, v->n_lost == 1 ? "" : "s");
     if (v->dir)
         printf("; in %s", v->dir);
     printf("\n");
