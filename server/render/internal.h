@@ -145,6 +145,7 @@ struct scratch {
     int n_wholes;                // so many were made
     uint64_t wholes_of;          // the frame
     struct sample samples[BATCH];
+    int grid;       // samples per side of each group's square; they are neighbours
     int lit[BATCH]; // indices of samples that shading works on
     struct receivers receivers;
     int16_t shadow_lights[GN_LIGHTS_MAX]; // that virtual objects may hide from a receiver, a tile

@@ -310,6 +310,7 @@ static void flush(const struct frame *frame, struct scratch *scratch, bool is_gr
     inner->hidden_texels = scratch->hidden_texels;
     inner->cut_places = scratch->cut_places;
     inner->hidden_places = scratch->hidden_places;
+    inner->grid = 1;
     gn_tiles_light_samples(frame, inner, optics->n_ends, n_paths, figures);
     if (frame->run_shadow)
         gn_shadow_find_groups(frame, inner->samples, optics->n_ends, is_summed);

@@ -107,32 +107,69 @@ static void shade_by_irradiance(const struct frame *frame, struct sample *s)
     reflect_irradiance(s, sum);
 }
 
+/** Cosine between normals that see much the same light. */
+#define ALIKE 0.998f
+
+static bool is_seen_directly(const struct sample *s)
+{
+    return s->kind == SAMPLE_VIRTUAL && s->is_lit &&
+           memcmp(s->seen_dir, s->dir, sizeof(s->dir)) == 0;
+}
+
+/**
+ * The sample whose irradiance is taken for the i-th: of a grid each row's on the diagonal where it
+ * is much like it, else its own. What a pixel shows of a surface is its albedo's and its outline's
+ * detail more than its light's; rays to the lights are most of a grid's cost.
+ */
+static int find_irradiance(const struct scratch *scratch, int i)
+{
+    const struct sample *s = &scratch->samples[i];
+    int grid = scratch->grid;
+    int row = i % (grid * grid) / grid;
+    int there = i - i % (grid * grid) + row * grid + row;
+    const struct sample *t = &scratch->samples[there];
+    bool is_alike = is_seen_directly(s) && is_seen_directly(t) && t->object == s->object &&
+                    dot3(t->surface.normal_shading, s->surface.normal_shading) > ALIKE &&
+                    dot3(t->surface.normal_horizon, s->surface.normal_horizon) > ALIKE;
+    return is_alike ? there : i;
+}
+
 void gn_shade_samples(const struct frame *frame, struct scratch *scratch, int n,
                       struct tile_figures *figures)
 {
     struct receivers *r = &scratch->receivers;
+    int from[BATCH]; // whose irradiance; -1: none is needed
+    double irradiance[BATCH][3];
     gn_receivers_begin(r);
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
+        from[i] = -1;
         if (s->kind != SAMPLE_VIRTUAL || !s->is_lit)
             continue;
         gn_near_add_emission(frame, s);
-        if (frame->options.shading == GN_SHADING_IRRADIANCE)
+        if (frame->options.shading == GN_SHADING_IRRADIANCE) {
             shade_by_irradiance(frame, s);
-        else
+            continue;
+        }
+        from[i] = find_irradiance(scratch, i);
+        if (from[i] == i)
             gn_receivers_add(r, scratch->samples, i, frame->blend.n);
     }
     gn_receivers_end(r, frame->blend.n);
     gn_occlusion_find_all(frame, scratch, &figures->rays_shade);
     for (int b = 0; b < r->n_blocks; b++) {
-        double irradiance[3][LANES];
+        double sums[3][LANES];
         for (int l = 0; l < frame->lights->n; l++)
             scratch->mask[l] = (uint16_t)~scratch->hidden[b][l];
-        gn_receivers_sum(frame, r, b, scratch->mask, false, irradiance);
+        gn_receivers_sum(frame, r, b, scratch->mask, false, sums);
         for (int i = 0; i < LANES && b * LANES + i < r->n; i++) {
-            const double e[3] = {irradiance[0][i], irradiance[1][i], irradiance[2][i]};
-            reflect_irradiance(&scratch->samples[r->sample[b * LANES + i]], e);
+            for (int k = 0; k < 3; k++)
+                irradiance[r->sample[b * LANES + i]][k] = sums[k][i];
         }
+    }
+    for (int i = 0; i < n; i++) {
+        if (from[i] >= 0)
+            reflect_irradiance(&scratch->samples[i], irradiance[from[i]]);
     }
 }
 

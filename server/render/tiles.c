@@ -176,6 +176,7 @@ static void render_centres(void *context, int item, int worker)
         return;
     int64_t start = gn_clock_get_monotonic_ns();
     int n = see_tile(frame, scratch, item, pixels, figures);
+    scratch->grid = 1;
     figures->s_primary += 1e-9 * (double)(gn_clock_get_monotonic_ns() - start);
     for (int i = 0; i < n && frame->shadow_step > 1; i++)
         gn_coarse_put_off(frame, pixels[i][0], pixels[i][1], &scratch->samples[i]);
@@ -199,6 +200,7 @@ static void render_centres(void *context, int item, int worker)
 static void see_again(const struct frame *frame, struct scratch *scratch, int (*pixels)[2], int n,
                       struct tile_figures *figures)
 {
+    scratch->grid = 1;
     for (int i = 0; i < n; i++) {
         struct sample *s = &scratch->samples[i];
         int x = pixels[i][0];
@@ -252,6 +254,7 @@ static void refine_pixels(const struct frame *frame, struct scratch *scratch, in
 {
     int grid = frame->rule.grid;
     int parts = grid * grid;
+    scratch->grid = grid;
     for (int i = 0; i < n * parts; i++) {
         struct sample *s = &scratch->samples[i];
         int x = pixels[i / parts][0];

@@ -279,6 +279,79 @@ static void test_depth_is_at_the_centre_of_the_pixel(void **state)
     gn_test_stage_finish(&stage);
 }
 
+static void paint_lamps(void *context, const double dir[static 3], float out_rgb[static 3])
+{
+    (void)context;
+    for (int k = 0; k < 3; k++)
+        out_rgb[k] =
+            (float)(0.2 + (dir[2] > 0.6 && dir[0] > 0.3 ? 10 : 0) + (dir[1] < -0.8 ? 3 : 0));
+}
+
+/** Coverage of the finer picture's 3 x 3 pixels, and the sum of squares of what the pixel is off
+ * from their mean. */
+static double compare_pixel(const struct gn_test_stage *coarse, const struct gn_test_stage *fine,
+                            int x, int y)
+{
+    const float *rgba = gn_image_at(&coarse->layers.virtual_rgba, x, y);
+    double mean[4] = {0};
+    double sum = 0;
+    for (int i = 0; i < 9; i++) {
+        const float *part = gn_image_at(&fine->layers.virtual_rgba, 3 * x + i % 3, 3 * y + i / 3);
+        for (int k = 0; k < 4; k++)
+            mean[k] += part[k] / 9.0;
+    }
+    assert_float_equal(rgba[3], mean[3], 1e-6);
+    for (int k = 0; k < 3; k++)
+        sum += ((double)rgba[k] - mean[k]) * ((double)rgba[k] - mean[k]);
+    return sum;
+}
+
+/** The grid's rays are the centres of a picture three times as fine, so that picture is what they
+ * show, had each its own light. */
+static void test_grids_share_their_light(void **state)
+{
+    (void)state;
+    struct gn_test_stage stages[2] = {{0}};
+    const double eye[3] = {1.3, -1.6, 1.2};
+    for (int i = 0; i < 2; i++) {
+        struct gn_test_stage *stage = &stages[i];
+        gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_sphere(0.3f, 24), 0, 0, 0.1,
+                          GN_MATERIAL_DIFFUSE, green);
+        gn_test_stage_add(stage, GN_RT_VIRTUAL, gn_test_make_box(0.2f, 0.2f, 0.5f), 0.35, -0.2, 0.1,
+                          GN_MATERIAL_DIFFUSE, grey);
+        gn_test_stage_commit(stage, 2);
+        gn_test_stage_set_map(stage, 32, 16, paint_lamps, NULL);
+        gn_test_stage_set_lights_from_map(stage, 1);
+        gn_test_stage_aim(stage, i ? 216 : 72, i ? 216 : 72, i ? 540 : 180, eye, origin);
+    }
+    const struct gn_render_options grids = {.supersample_all = true};
+    const struct gn_render_options centres = {.single_ray = true};
+    gn_test_stage_render(&stages[0], &grids);
+    gn_test_stage_render(&stages[1], &centres);
+    uint64_t rays = stages[0].report.rays_shade;
+    uint64_t all = stages[1].report.rays_shade;
+    double sum = 0;
+    double most = 0;
+    double brightest = 0;
+    int n = 0;
+    for (int i = 0; i < 72 * 72; i++) {
+        const float *rgba = gn_image_at(&stages[0].layers.virtual_rgba, i % 72, i / 72);
+        double square = compare_pixel(&stages[0], &stages[1], i % 72, i / 72);
+        n += rgba[3] > 0;
+        sum += square;
+        most = fmax(most, sqrt(square / 3));
+        brightest = fmax(brightest, rgba[1]);
+    }
+    double error = sqrt(sum / (3 * n)) / brightest;
+    print_message("# %d pixels, %llu of %llu rays, off by %.2g of the brightest, most %.2g\n", n,
+                  (unsigned long long)rays, (unsigned long long)all, error, most / brightest);
+    assert_true(n > 2000);
+    assert_true(4 * rays < 3 * all);
+    assert_true(error < 0.002 && most < 0.03 * brightest);
+    for (int i = 0; i < 2; i++)
+        gn_test_stage_finish(&stages[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -288,6 +361,7 @@ int main(void)
         cmocka_unit_test(test_real_objects_hide_virtual_ones),
         cmocka_unit_test(test_mirror_reflects_the_map_and_the_scene),
         cmocka_unit_test(test_mirrors_end),
+        cmocka_unit_test(test_grids_share_their_light),
         cmocka_unit_test(test_distortion_moves_the_object_as_the_lens_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
