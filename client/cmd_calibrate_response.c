@@ -284,9 +284,14 @@ static void print_results(const struct gn_chart_response *r)
         return;
     printf("matrix to Rec.709: condition number %.1f (at most %.0f), error %.1f %% RMS\n",
            r->matrix.condition, GN_CHART_MAX_CONDITION, 100 * r->matrix.rms);
-    for (int j = 0; j < GN_CHART_PATCHES; j++)
-        printf("  %2d %-13s %5.1f %%%s\n", j + 1, gn_chart_get_name(j), 100 * r->matrix.error[j],
-               r->matrix.is_outlier[j] ? "  left out" : "");
+    for (int j = 0; j < GN_CHART_PATCHES; j++) {
+        printf("  %2d %-13s ", j + 1, gn_chart_get_name(j));
+        if (isfinite(r->matrix.error[j]))
+            printf("%5.1f %%%s\n", 100 * r->matrix.error[j],
+                   r->matrix.is_outlier[j] ? "  left out" : "");
+        else
+            printf("clipped in every picture\n");
+    }
 }
 
 static int write_chart(const struct run *run, const struct gn_chart_response *r,
