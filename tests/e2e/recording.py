@@ -424,8 +424,13 @@ def test_usage():
         replay(daemon, folder, '--as-fast-as-possible', '--loop').fail(2, '--loop')
         replay(daemon, folder, '--as-fast-as-possible', '--rate-factor', '2').fail(2, 'one of them')
         replay(daemon, folder, '--streams', 'screen').fail(1, 'no stream of such a role')
+        n_before = daemon.read_log().count(' in room demo as ')
         late = replay(daemon, folder, '--rate-factor', '.05')
-        time.sleep(.8)
+        deadline = time.monotonic() + 60
+        while daemon.read_log().count(' in room demo as ') < n_before + 2:
+            assert time.monotonic() < deadline, 'never connected'
+            time.sleep(.05)
+        time.sleep(.3)  # to the end of its greeting
         daemon.kill()
         status, _, err = late.end()
         assert status == 1 and 'is lost: ' in err, err
