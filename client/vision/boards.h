@@ -4,7 +4,8 @@
  * What calibration takes from OpenCV: the corners of chessboards and ChArUco boards, the place of a
  * colour chart, and the least squares of a camera's intrinsics. Picture positions are ours (pixel
  * centres at half-integers). Points in C and in C++. Without OpenCV in the build every function
- * returns -ENOSYS and a sentence. Thread-safety: safe; looking for a chart leaves OpenCV with one thread.
+ * returns -ENOSYS and a sentence. Thread-safety: safe; looking for a chart leaves OpenCV with one
+ * thread.
  */
 #ifndef GN_CLIENT_VISION_BOARDS_H
 #define GN_CLIENT_VISION_BOARDS_H
