@@ -99,20 +99,6 @@ struct gn_mesh gn_test_make_cube(float size)
     return mesh;
 }
 
-uint64_t gn_test_random(uint64_t *state)
-{
-    // Source: Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014.
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return z ^ (z >> 31);
-}
-
-double gn_test_random_unit(uint64_t *state)
-{
-    return (double)(gn_test_random(state) >> 11) * 0x1p-53;
-}
-
 void gn_test_random_direction(uint64_t *state, float out_dir[3])
 {
     double z = 2.0 * gn_test_random_unit(state) - 1.0;

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "server/scene/mesh.h"
+#include "tests/random.h"
 
 /** The square [-size/2, size/2]^2 in z = 0, n x n cells of two triangles, normal +z. */
 struct gn_mesh gn_test_make_plane(float size, int n);
@@ -19,11 +20,7 @@ struct gn_mesh gn_test_make_sphere(float radius, int n);
 /** The cube [-size/2, size/2]^3, 12 triangles, 8 shared vertices, no normals. */
 struct gn_mesh gn_test_make_cube(float size);
 
-/** Deterministic random numbers (splitmix64); *state is the seed at first. */
-uint64_t gn_test_random(uint64_t *state);
-/** Uniform in [0, 1). */
-double gn_test_random_unit(uint64_t *state);
-/** Uniform on the unit sphere. */
+/** Uniform on the unit sphere; *state as in tests/random.h. */
 void gn_test_random_direction(uint64_t *state, float out_dir[3]);
 
 #endif

@@ -12,6 +12,7 @@
 #include "server/light/luminance.h"
 #include "server/light/state.h"
 #include "tests/light_fixture.h"
+#include "tests/random.h"
 
 enum { SIDE = 128, N_FRAMES = 75, N_SETTLE = 30, IDS_MAX = 512 };
 static const double pi = 3.14159265358979323846;
@@ -42,21 +43,13 @@ static void end(struct stream *s)
     light_fixture_finish(&s->shown);
 }
 
-/* [0, 1). Source: Steele et al., "Fast splittable pseudorandom number generators", OOPSLA 2014. */
-static double get_random(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
-}
-
 /* The clean frame with noise of that share of each texel, 1 / rate after the last. */
 static void show(struct stream *s, double noise, double rate)
 {
     size_t n = (size_t)SIDE * SIDE * 3;
     for (size_t i = 0; i < n; i++) { // uniform, of that standard deviation
-        double factor = noise > 0 ? 1 + noise * sqrt(12) * (get_random(&s->seed) - 0.5) : 1;
+        double factor =
+            noise > 0 ? 1 + noise * sqrt(12) * (gn_test_random_unit(&s->seed) - 0.5) : 1;
         s->shown.image.data[i] = (float)((double)s->clean.image.data[i] * factor);
     }
     s->shown.frame.sequence++;

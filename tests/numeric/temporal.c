@@ -7,23 +7,15 @@
 
 #include "common/pool.h"
 #include "tests/light_fixture.h"
+#include "tests/random.h"
 #include "tests/temporal_play.h"
 
 static const double pi = 3.14159265358979323846;
 
-/* [0, 1), the same in each run. Source: Steele et al., "Fast splittable pseudorandom number
- * generators", OOPSLA 2014 (SplitMix64). */
-static double get_random(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
-}
-
 static double get_normal(uint64_t *state)
 {
-    return sqrt(-2 * log(1 - get_random(state))) * cos(2 * pi * get_random(state));
+    return sqrt(-2 * log(1 - gn_test_random_unit(state))) *
+           cos(2 * pi * gn_test_random_unit(state));
 }
 
 /* Sets the power of the i-th light. */
@@ -51,7 +43,7 @@ static void follow_step(double tau, double rate, double factor, double out_power
     for (int i = 0; i < 8; i++) { // 67 ms apart: one frame at 15 Hz
         double left = 1.0 / 15;
         while (left > 1e-9) {
-            double dt = rate > 0 ? 1 / rate : 1e-4 + 0.02 * get_random(&seed);
+            double dt = rate > 0 ? 1 / rate : 1e-4 + 0.02 * gn_test_random_unit(&seed);
             dt = dt < left + 1e-9 ? dt : left;
             show(&p, dt);
             left -= dt;
@@ -157,16 +149,18 @@ static void stands_any_clock(void **test)
         begin(&p);
         double unit = pow(10, 3 * run - 30), largest = 0;
         for (int frame = 0; frame < 400; frame++) {
-            p.n = (int)(20 * get_random(&seed));
+            p.n = (int)(20 * gn_test_random_unit(&seed));
             int n = p.n;
             p.n = 0;
             for (int i = 0; i < n; i++) {
-                double power = unit * pow(10, 4 * get_random(&seed));
-                put_light(&p, 1 + (uint64_t)(30 * get_random(&seed)), 6.28 * get_random(&seed),
-                          3.1 * get_random(&seed) - 1.55, power);
+                double power = unit * pow(10, 4 * gn_test_random_unit(&seed));
+                put_light(&p, 1 + (uint64_t)(30 * gn_test_random_unit(&seed)),
+                          6.28 * gn_test_random_unit(&seed),
+                          3.1 * gn_test_random_unit(&seed) - 1.55, power);
                 largest += power;
             }
-            double kind = get_random(&seed), dt = pow(10, -6 + 8 * get_random(&seed));
+            double kind = gn_test_random_unit(&seed),
+                   dt = pow(10, -6 + 8 * gn_test_random_unit(&seed));
             show(&p, kind < 0.1 ? 0 : kind < 0.2 ? -dt : dt);
             check_finite(&p, largest * 1.0001);
         }

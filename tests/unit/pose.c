@@ -9,18 +9,15 @@
 #include <string.h>
 
 #include "common/pose.h"
+#include "tests/random.h"
 #include "tests/unit/cmocka_setup.h"
 
 static uint64_t seed = 20070601;
 
-/* Uniform in [-1, 1). Source: Steele, Lea, Flood 2014 (SplitMix64). */
+/* Uniform in [-1, 1). */
 static double draw(void)
 {
-    uint64_t z = seed += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    z ^= z >> 31;
-    return (double)(z >> 11) * 0x1p-52 - 1.0;
+    return 2 * gn_test_random_unit(&seed) - 1;
 }
 
 static struct gn_pose draw_pose(void)
