@@ -28,6 +28,7 @@ struct gn_rig_sequence_options {
     double turn_deg;         // turns a map about +z
     double light_distance;   // m, 0: infinitely far
     int width, height;       // px, of the camera, [16, 4096]
+    double zoom;             // of its focal length, [0.25, 16]; 0: 1
     int frames_per_light;    // [1, 250]; the lamp room has four lights, a map is one
     int probe_size;          // px, [16, 2048]
     enum gn_rig_probe probe; // that sequence.json names

@@ -66,17 +66,23 @@ static uint64_t hash_bytes(uint64_t hash, const void *data, size_t n)
     return hash;
 }
 
+static double get_zoom(const struct gn_rig_sequence_options *o)
+{
+    return o->zoom > 0 ? o->zoom : 1;
+}
+
 static int make_key(struct maker *m, struct gn_error *error)
 {
     const struct gn_rig_sequence_options *o = m->o;
     char text[512];
     uint64_t hash = 0xcbf29ce484222325u;
-    int n =
-        snprintf(text, sizeof(text),
-                 "%s %.17g %.17g %d %d %d %d %d %d %d %d %d %" PRIu64 " %.17g %.17g %.17g %d %d",
-                 RECIPE, o->turn_deg, o->light_distance, o->width, o->height, o->frames_per_light,
-                 o->probe_size, (int)o->probe, o->is_float, o->bounces, o->paths, o->direct_paths,
-                 o->seed, o->noise, o->jitter_mm, o->jitter_deg, o->is_distorted, o->is_smooth);
+    int n = snprintf(text, sizeof(text),
+                     "%s %.17g %.17g %d %d %.17g %d %d %d %d %d %d %d %" PRIu64
+                     " %.17g %.17g %.17g %d %d",
+                     RECIPE, o->turn_deg, o->light_distance, o->width, o->height, get_zoom(o),
+                     o->frames_per_light, o->probe_size, (int)o->probe, o->is_float, o->bounces,
+                     o->paths, o->direct_paths, o->seed, o->noise, o->jitter_mm, o->jitter_deg,
+                     o->is_distorted, o->is_smooth);
     hash = hash_bytes(hash, text, (size_t)n);
     if (strcmp(o->light, "lamps")) {
         uint8_t *data = NULL;
@@ -213,6 +219,7 @@ static void place_camera(const struct maker *m, double t, struct gn_rig_view *ou
 {
     const struct gn_rig_sequence_options *o = m->o;
     const double target[3] = {0.006, 0.050, 0.012};
+    double focal = 1.32 * o->width * get_zoom(o);
     double azimuth = (-99 + 14 * t) * GN_RIG_PI / 180;
     double elevation = (35 + 2.5 * sin(GN_RIG_PI * t)) * GN_RIG_PI / 180, distance = 0.5;
     const double position[3] = {distance * cos(elevation) * cos(azimuth),
@@ -220,8 +227,8 @@ static void place_camera(const struct maker *m, double t, struct gn_rig_view *ou
                                 distance * sin(elevation)};
     *out_view = (struct gn_rig_view){.width = o->width,
                                      .height = o->height,
-                                     .fx = 1.32 * o->width,
-                                     .fy = 1.32 * o->width,
+                                     .fx = focal,
+                                     .fy = focal,
                                      .cx = o->width / 2.0,
                                      .cy = o->height / 2.0};
     if (o->is_distorted)
