@@ -3,7 +3,7 @@
 /*
  * Whole frames at all scales and far from the origin: no point of a lit surface hides light from
  * itself (acne), no light gets into what is closed (leaks). Steps between coordinates: see
- * render_scales.c.
+ * render_scales.c. Under sanitizers the least and the greatest of scales and distances.
  */
 #include "tests/unit/cmocka_setup.h"
 
@@ -12,6 +12,7 @@
 #include "proto/attr.h"
 #include "tests/meshes.h"
 #include "tests/numeric/extreme.h"
+#include "tests/sanitized.h"
 
 #define SIDE 24
 #define N_PIXELS (SIDE * SIDE)
@@ -26,8 +27,9 @@ static const double distances[] = {0, 1e2, 1e4};
 /** Calls test at all scales and distances, for a plane of one cell and of 16 x 16. */
 static void for_all_places(void (*test)(const struct gn_extreme_place *place, int n, double step))
 {
-    for (size_t s = 0; s < GN_ARRAY_LEN(scales); s++) {
-        for (size_t d = 0; d < GN_ARRAY_LEN(distances); d++) {
+    for (size_t s = 0; s < GN_ARRAY_LEN(scales); s = gn_test_get_next(s, GN_ARRAY_LEN(scales))) {
+        for (size_t d = 0; d < GN_ARRAY_LEN(distances);
+             d = gn_test_get_next(d, GN_ARRAY_LEN(distances))) {
             const struct gn_extreme_place place = gn_extreme_away(scales[s], distances[d]);
             test(&place, 1, gn_extreme_get_step(distances[d]));
             test(&place, 16, gn_extreme_get_step(distances[d]));
