@@ -278,7 +278,8 @@ static void test_read_errors(void **unused)
         {"{" SIZES LENS POSE ",\"response\":\"srgb\"}",
          ": response: expected an object, found a string"},
         {"{" SIZES LENS POSE ",\"response\":{\"type\":\"sRGB\"}}",
-         ": response.type: expected one of 'linear', 'srgb', 'gamma', 'log', 'table', found 'sRGB'"},
+         ": response.type: expected one of 'linear', 'srgb', 'gamma', 'log', 'table', found "
+         "'sRGB'"},
         {"{" SIZES LENS POSE ",\"response\":{\"type\":\"srgb\",\"gamma\":2}}",
          ": response: unknown key 'gamma'; known are type"},
         {"{" SIZES LENS POSE ",\"response\":{\"type\":\"gamma\",\"gamma\":0}}",
