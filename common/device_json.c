@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <float.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -271,6 +272,10 @@ static int read_masks(const struct gn_json *object, struct gn_probe_setup *out,
             ret = gn_json_check_keys(&item, keys, GN_ARRAY_LEN(keys), out_error);
         if (ret == 0)
             ret = gn_json_get_numbers(&item, "center", 2, out->masks[i].center, out_error);
+        for (int k = 0; ret == 0 && k < 2; k++)
+            if (!(fabs(out->masks[i].center[k]) <= GN_IMAGE_MAX_SIDE))
+                ret = gn_json_refuse(&item, "center", out_error, "must lie within %d px",
+                                     GN_IMAGE_MAX_SIDE);
         if (ret == 0)
             ret = gn_json_get_double(&item, "radius", 1e-3, GN_IMAGE_MAX_SIDE,
                                      &out->masks[i].radius, out_error);

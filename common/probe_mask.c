@@ -85,8 +85,8 @@ void gn_probe_mask_fill(const struct gn_probe_mask *masks, int n_masks, void *pi
         const struct gn_probe_mask *mask = &masks[m];
         struct ring ring;
         look_around(&p, mask, &ring);
-        int y0 = (int)fmax(floor(mask->center[1] - mask->radius), 0);
-        int x0 = (int)fmax(floor(mask->center[0] - mask->radius), 0);
+        int y0 = (int)fmin(fmax(floor(mask->center[1] - mask->radius), 0), height);
+        int x0 = (int)fmin(fmax(floor(mask->center[0] - mask->radius), 0), width);
         for (int y = y0; y < height && y + 0.5 <= mask->center[1] + mask->radius; y++)
             for (int x = x0; x < width && x + 0.5 <= mask->center[0] + mask->radius; x++)
                 if (hypot(x + 0.5 - mask->center[0], y + 0.5 - mask->center[1]) <= mask->radius)

@@ -138,6 +138,8 @@ static void test_refusals(void **unused)
          "p.json: response.table: element 1: expected a number, found a string"},
         {"{\"projection\":\"angular\",\"mask\":[{\"center\":[1,2],\"radius\":0}]}",
          "p.json: mask[0].radius: expected a number in [0.001, 16384]"},
+        {"{\"projection\":\"angular\",\"mask\":[{\"center\":[1e300,2],\"radius\":5}]}",
+         "p.json: mask[0].center: must lie within 16384 px"},
         {"{\"projection\":\"angular\",\"mask\":[[1,2,3]]}", "p.json: mask[0]: expected an object"},
         {"{\"projection\":\"angular\",\"to_rec709\":[1,0,0,1,0,0,0,0,1]}",
          "p.json: response: a response's matrix to Rec.709 must be finite and invertible"},
