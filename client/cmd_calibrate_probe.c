@@ -350,6 +350,7 @@ static int look_for_lamps(struct run *run, int i, const struct gn_image *light,
             struct gn_fisheye_puzzle *c = &run->candidates[run->n_candidates++];
             memcpy(c->xy, spots[s].xy, sizeof(c->xy));
             memcpy(c->dir_world, lamp->dir_world, sizeof(c->dir_world));
+            c->picture = i;
         }
     return 0;
 }

@@ -294,7 +294,7 @@ int gn_fisheye_fit(const struct gn_projection *projection, int moves,
     return run(&f, sightings, out_fit, out_error);
 }
 
-/* How many spots an orientation explains: each candidate's angle, the best per spot. */
+/* How many candidates an orientation explains. */
 static int count_explained(const struct gn_fisheye_puzzle *c, const double (*seen)[3], int n,
                            const struct gn_pose *pose, double tolerance, double *out_error_sum)
 {
@@ -312,6 +312,39 @@ static int count_explained(const struct gn_fisheye_puzzle *c, const double (*see
     return count;
 }
 
+static bool is_rival(const struct gn_fisheye_puzzle *a, const struct gn_fisheye_puzzle *b)
+{
+    return a->picture == b->picture &&
+           (memcmp(a->xy, b->xy, sizeof(a->xy)) == 0 ||
+            memcmp(a->dir_world, b->dir_world, sizeof(a->dir_world)) == 0);
+}
+
+/* The candidates that an orientation explains best: of rivals the nearest. angle[n] is scratch. */
+static int keep_nearest(const struct gn_fisheye_puzzle *c, const double (*seen)[3], int n,
+                        const struct gn_pose *pose, double tolerance, double *angle,
+                        struct gn_fisheye_sighting *out)
+{
+    int kept = 0;
+    for (int i = 0; i < n; i++) {
+        double world[3];
+        gn_pose_rotate(pose, seen[i], world);
+        angle[i] = get_angle(world, c[i].dir_world);
+    }
+    for (int i = 0; i < n; i++) {
+        bool is_nearest = angle[i] < tolerance;
+        for (int k = 0; k < n && is_nearest; k++)
+            is_nearest = !(is_rival(&c[i], &c[k]) &&
+                           (angle[k] < angle[i] || (angle[k] == angle[i] && k < i)));
+        if (!is_nearest)
+            continue;
+        struct gn_fisheye_sighting *s = &out[kept++];
+        memcpy(s->xy, c[i].xy, sizeof(s->xy));
+        memcpy(s->dir_world, c[i].dir_world, sizeof(s->dir_world));
+        s->error_deg = 0;
+    }
+    return kept;
+}
+
 int gn_fisheye_match(const struct gn_projection *projection,
                      const struct gn_fisheye_puzzle *candidates, int n, double tolerance_deg,
                      struct gn_fisheye_sighting *out_sightings, struct gn_error *out_error)
@@ -320,8 +353,12 @@ int gn_fisheye_match(const struct gn_projection *projection,
     double best_error = INFINITY, tolerance = tolerance_deg / DEGREE;
     struct gn_pose best_pose = {{1, 0, 0, 0}, {0}};
     double(*seen)[3] = calloc((size_t)(n > 0 ? n : 1), sizeof(*seen));
-    if (!seen)
+    double *angle = calloc((size_t)(n > 0 ? n : 1), sizeof(*angle));
+    if (!seen || !angle) {
+        free(seen);
+        free(angle);
         return gn_error_set(out_error, -ENOMEM, "out of memory");
+    }
     for (int i = 0; i < n; i++)
         if (!gn_projection_get_direction(projection, candidates[i].xy[0], candidates[i].xy[1],
                                          seen[i]))
@@ -347,16 +384,15 @@ int gn_fisheye_match(const struct gn_projection *projection,
                 best_pose = pose;
             }
         }
-    for (int i = 0; i < n && best >= 2; i++) {
-        double world[3];
-        gn_pose_rotate(&best_pose, seen[i], world);
-        if (get_angle(world, candidates[i].dir_world) >= tolerance)
-            continue;
-        struct gn_fisheye_sighting *s = &out_sightings[found++];
-        memcpy(s->xy, candidates[i].xy, sizeof(s->xy));
-        memcpy(s->dir_world, candidates[i].dir_world, sizeof(s->dir_world));
-        s->error_deg = 0;
+    // Again from all that was kept: the first orientation leans on two of them only.
+    for (int round = 0; round < 3 && best >= 2; round++) {
+        double spread;
+        found = keep_nearest(candidates, (const double(*)[3])seen, n, &best_pose, tolerance, angle,
+                             out_sightings);
+        if (find_orientation(projection, out_sightings, found, &best_pose, &spread) < 0)
+            break;
     }
+    free(angle);
     free(seen);
     if (found < 2)
         return gn_error_set(out_error, -EDOM,

@@ -44,7 +44,7 @@ struct gn_fisheye_fit {
  * Orientation by SVD (Wahba), then orientation and what `moves` says together by Gauss-Newton with
  * damping (Levenberg 1944), by QR. projection: initialised, radial. Returns 0, or -EDOM and a
  * sentence: fewer than two directions, directions nearly on one line, lens not determined by
- * these lamps, a lamp far off.
+ * these lamps. How far each is off is told, not judged.
  */
 GN_MUST_USE int gn_fisheye_fit(const struct gn_projection *projection, int moves,
                                struct gn_fisheye_sighting *sightings, int n,
@@ -54,13 +54,15 @@ GN_MUST_USE int gn_fisheye_fit(const struct gn_projection *projection, int moves
 struct gn_fisheye_puzzle {
     double xy[2];        // px, of the spot
     double dir_world[3]; // of the light
+    int picture;         // that shows the spot
 };
 
 /**
- * Finds which spot is which light over all pictures together: every pair of candidates that are
- * not the same spot or light gives an orientation; the one that explains most spots within
- * tolerance_deg wins. candidates[n]: all pairs of a picture's spots and lights. out_sightings has
- * room for n. Returns how many sightings, or -EDOM and a sentence.
+ * Finds which spot is which light over all pictures together: every pair of candidates that lie
+ * apart gives an orientation; the one that explains most of them within tolerance_deg wins. Of a
+ * picture's spots near one light, and of lights near one spot, only the nearest counts then: flares
+ * stay out. candidates[n]: all pairs of a picture's spots and lights. out_sightings has room for n.
+ * Returns how many sightings, or -EDOM, -ENOMEM and a sentence.
  */
 GN_MUST_USE int gn_fisheye_match(const struct gn_projection *projection,
                                  const struct gn_fisheye_puzzle *candidates, int n,

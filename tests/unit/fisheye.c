@@ -107,6 +107,7 @@ static void test_rig_frames(void **unused)
             assert_true(n_spots >= 2);
             for (int s = 0; s < n_spots; s++)
                 for (int l = 0; l < lamps; l++) {
+                    candidates[n].picture = lamps;
                     memcpy(candidates[n].xy, spots[s].xy, sizeof(spots[s].xy));
                     get_lamp(l, candidates[n++].dir_world);
                 }
@@ -211,6 +212,31 @@ static void test_refusals(void **unused)
     assert_int_equal(gn_fisheye_match(&p, wrong, 2, 3, s, &e), -EDOM);
     assert_non_null(strstr(e.text, "within 3.0 degrees"));
     assert_int_equal(n, 20);
+}
+
+/* A flare 4 px (2.4 degrees) below two lamps in three, within the tolerance: it is no second
+ * sighting. */
+static void test_flares(void **unused)
+{
+    (void)unused;
+    struct gn_projection p = make_projection();
+    const struct gn_pose truth = {{1, 0, 0, 0}, {0}};
+    struct gn_fisheye_puzzle candidates[24];
+    struct gn_fisheye_sighting lamps[12], s[24];
+    struct gn_fisheye_fit fit;
+    struct gn_error e = {0};
+    assert_int_equal(see(&p, &truth, 12, 1.2, 0, lamps), 12);
+    for (int i = 0; i < 24; i++) {
+        candidates[i] = (struct gn_fisheye_puzzle){.picture = i / 2};
+        memcpy(candidates[i].xy, lamps[i / 2].xy, sizeof(lamps[i / 2].xy));
+        memcpy(candidates[i].dir_world, lamps[i / 2].dir_world, sizeof(lamps[i / 2].dir_world));
+        candidates[i].xy[1] += i % 2 && i % 3 ? 4 : 0;
+    }
+    int n = gn_fisheye_match(&p, candidates, 24, 4, s, &e);
+    assert_int_equal(n, 12);
+    assert_int_equal(gn_fisheye_fit(&p, 0, s, n, &fit, &e), 0);
+    printf("# flares: %.4f degrees off\n", fit.worst_deg);
+    assert_true(fit.worst_deg < 0.01);
 }
 
 /* A disc of uneven light in the dark, its outline cut by the picture's edge. */
@@ -337,7 +363,7 @@ int main(void)
         cmocka_unit_test(test_rig_frames), cmocka_unit_test(test_lens),
         cmocka_unit_test(test_refusals),   cmocka_unit_test(test_image_circle),
         cmocka_unit_test(test_ball),       cmocka_unit_test(test_mask),
-        cmocka_unit_test(test_wahba),
+        cmocka_unit_test(test_wahba),      cmocka_unit_test(test_flares),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
