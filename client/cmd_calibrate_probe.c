@@ -184,6 +184,7 @@ static int read_setup(struct run *run, struct gn_error *out_error)
                             "%s says no projection: give --projection, for example "
                             "fisheye-equidistant or mirrorball",
                             path);
+    run->setup.projection.focal = 0; // follows from radius, theta_max and model, which may change
     if (has(run, "theta-max"))
         run->setup.projection.theta_max =
             fmin(gn_options_get_double(run->options, NULL, NULL, "theta-max") *
@@ -304,7 +305,6 @@ static int find_circle(struct run *run, struct gn_error *out_error)
            circle.center[0], circle.center[1], circle.radius, circle.n_points, circle.rms);
     memcpy(p->center, circle.center, sizeof(p->center));
     p->radius = circle.radius;
-    p->focal = 0;
     if (!has(run, "ball"))
         return 0;
     if (p->type != GN_PROJECTION_MIRRORBALL)
@@ -314,10 +314,9 @@ static int find_circle(struct run *run, struct gn_error *out_error)
                        : DEFAULT_CAMERA_SHARE;
     memcpy(run->mask, circle.center, sizeof(circle.center));
     run->mask[2] = share * circle.radius;
-    if (!has(run, "theta-max")) { // the radius stays the ball's: r = R sin(theta / 2)
+    if (!has(run, "theta-max"))
         p->theta_max = BALL_THETA_MAX;
-        p->radius = circle.radius * sin(BALL_THETA_MAX / 2);
-    }
+    p->radius = circle.radius * sin(p->theta_max / 2); // of the ball's own: r = R sin(theta / 2)
     return 0;
 }
 
@@ -448,6 +447,8 @@ static int write_results(const struct run *run, struct gn_error *out_error)
     if (found && run->n_sightings > 0)
         json_object_set_new(found, "orientation",
                             gn_device_file_make_numbers(run->fit.world_from_probe.rotation, 4));
+    if (found && has(run, "ball")) // an older one goes
+        json_object_set_new(found, "mask", json_null());
     if (found && run->mask[2] > 0)
         json_object_set_new(found, "mask",
                             json_pack("[{s:o, s:f}]", "center",

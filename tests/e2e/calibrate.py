@@ -274,6 +274,11 @@ def check_ball():
         ball = setup['radius'] / math.sin(setup['theta_max'] / 2)
         assert abs(ball - 84.6) < .5 and setup['theta_max'] < 2.6, setup
         assert abs(mask['radius'] - .15 * 84.6) < .2 and mask['center'] == setup['center'], setup
+        succeed('probe', '--files', f.at('ball.png'), '--ball', '156,124,79', '--camera-share', 0,
+                '--theta-max', 120, '--out', f.at('probe.json'))
+        setup = json.load(open(f.at('probe.json')))
+        assert abs(setup['radius'] / math.sin(math.radians(60)) - 84.6) < .5, setup
+        assert abs(setup['theta_max'] - math.radians(120)) < 1e-6 and 'mask' not in setup, setup
         refuse('no ball is seen near (60, 60)', 'probe', '--files', f.at('ball.png'), '--projection',
                'mirrorball', '--ball', '60,60,30', '--out', f.at('x.json'))
 
