@@ -86,11 +86,14 @@ static int check(const char *text, size_t size, const char *path, struct gn_erro
     int err = gn_json_load_text(text, size, path, &root, out_error);
     struct gn_camera camera;
     struct gn_probe_setup setup;
+    struct gn_response response = {.type = GN_RESPONSE_LINEAR};
     if (!err && gn_json_has(&root, "fx"))
         err =
             gn_camera_read_json(&root, gn_json_has(&root, "world_from_camera"), &camera, out_error);
     else if (!err && gn_json_has(&root, "projection"))
         err = gn_probe_setup_read_json(&root, &setup, out_error);
+    else if (!err) // not yet one or the other
+        err = gn_response_read_json(&root, &response, out_error);
     gn_json_finish(&root);
     return err;
 }

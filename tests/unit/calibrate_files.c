@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "client/calibrate/device_file.h"
 #include "client/calibrate/views.h"
@@ -135,6 +136,12 @@ static void test_device_files(void **unused)
                 0);
     assert_int_equal(gn_camera_read_file(path, &camera, &e), 0);
     assert_true(camera.response.log_b == 0.07);
+    char fresh[512]; // neither a camera's nor a probe's yet: refused all the same
+    snprintf(fresh, sizeof(fresh), "%s", gn_test_folder_get_path("fresh.json"));
+    assert_true(gn_device_file_update(
+                    fresh, json_pack("{s:o}", "response", gn_device_file_make_curve(&curve)), &e) <
+                0);
+    assert_int_not_equal(access(fresh, F_OK), 0);
     curve = (struct gn_curve){.model = GN_CURVE_LINEAR, .a = 0.02, .b = 0.5};
     assert_int_equal(
         gn_device_file_update(
