@@ -29,10 +29,8 @@ struct video_source {
     char *path; // owned
     struct gn_video_options options;
     struct gn_video_file file;
-    struct SwsContext *sws;     // owned
-    struct SwsContext *sws_set; // the one whose colours are set; borrowed
-    int sws_colours;            // the matrix and range it is set to
-    uint8_t *pixels;            // owned
+    struct SwsContext *sws; // owned
+    uint8_t *pixels;        // owned
     size_t pixels_cap;
     bool has_start;
     double start_s; // the file's time of its first picture
@@ -100,15 +98,11 @@ static int prepare_sws(struct video_source *s, const AVFrame *f, enum AVPixelFor
     if (!s->sws)
         return gn_error_set(out_error, -ENOTSUP, "%s: no conversion from the pixel format %s",
                             s->path, av_get_pix_fmt_name(f->format));
-    int colours = 2 * matrix + is_full_range(f);
-    if (s->sws == s->sws_set && colours == s->sws_colours)
-        return 0;
     const int one = 1 << 16; // contrast and saturation; brightness 0
-    // What is R, G, B already has no matrix: then this is declined, and rightly.
+    // Where nothing has changed this does nothing. What is R, G, B already has no matrix: then it
+    // is declined, and rightly.
     (void)sws_setColorspaceDetails(s->sws, sws_getCoefficients(matrix), is_full_range(f),
                                    sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, one, one);
-    s->sws_set = s->sws;
-    s->sws_colours = colours;
     return 0;
 }
 
