@@ -158,9 +158,14 @@ def test_stock():
         assert 'no such camera; there are: Aravis-Fake-ST7' in err and err.count('\n') == 1, err
 
 
-def read_number(path):
-    with open(path) as f:
-        return int(f.read())
+def get_socket_limit():
+    """Largest receive buffer of a socket, bytes. Kernels before 6.9 do not show it in networks of
+    one's own; None then."""
+    try:
+        with open('/proc/sys/net/core/rmem_max') as f:
+            return int(f.read())
+    except FileNotFoundError:
+        return None
 
 
 def test_ordinary_user():
@@ -171,7 +176,7 @@ def test_ordinary_user():
         drop = nobody
     with Camera(*size(640, 480)):
         got = read_pictures('127.0.0.1', 'Mono12', 30, width=640, height=480, rate=30, before=drop)
-    if read_number('/proc/sys/net/core/rmem_max') >= 1 << 20:
+    if (get_socket_limit() or 0) >= 1 << 20:
         # With the buffer that sockets have by themselves three of four are incomplete.
         assert got['incomplete'] <= 6, got
 
@@ -200,8 +205,7 @@ def test_times():
 
 def test_restart():
     """The camera is killed and comes back: pictures within 2 s, and nobody else notices."""
-    with Daemon() as daemon, Folder() as folder:
-        camera = Camera(*size())
+    with Daemon() as daemon, Folder() as folder, Camera(*size()) as camera:
         lamp = probe(daemon, folder, '--frame-rate', '25')
         lamp.wait_for('environment frame 5:')
         os.mkdir(folder.at('shots'))
@@ -215,14 +219,14 @@ def test_restart():
         while 'lost' not in lamp.read_err():
             time.sleep(0.02)
         viewer.wait_for('^frame 10:')
-        with Camera(*size()) as camera:
+        with Camera(*size()) as again:
             # All that was printed before is read; the next line is of a picture that came now.
             os.set_blocking(lamp.process.stdout.fileno(), False)
             while lamp.process.stdout.readline():
                 pass
             os.set_blocking(lamp.process.stdout.fileno(), True)
             lamp.wait_for('environment frame')
-            gap_s = time.monotonic() - camera.ready_s
+            gap_s = time.monotonic() - again.ready_s
             assert gap_s < 2, 'pictures came %.2f s after the camera' % gap_s
             lamp.wait_for('environment frame')
             out, err = lamp.interrupt()
@@ -276,21 +280,30 @@ def test_controller():
         read_pictures('127.0.0.1', 'Mono12', 3)
 
 
+def count_lies(daemon, folder, seconds):
+    """How many of the camera's pictures were refused while a probe read it, and none was sent."""
+    before = daemon.read_log().count(' as probe')
+    lamp = probe(daemon, folder, '--frame-rate', '50')
+    while daemon.read_log().count(' as probe') == before:
+        assert lamp.process.poll() is None, lamp.read_err()
+        time.sleep(0.02)
+    time.sleep(seconds)
+    out, _ = lamp.interrupt()
+    count = re.search(r'camera: 0 whole pictures, (\d+) incomplete', out)
+    assert count and '0 environment frames sent' in out, out
+    return int(count.group(1))
+
+
 def test_hostile():
     """Cameras that lie: no picture of theirs is given out; the daemon sees nothing of it."""
     with Daemon() as daemon, Folder() as folder:
         for fault in ('size', 'format', 'truncated'):
             with Camera(*size(), '--fault', fault):
-                before = daemon.read_log().count(' as probe')
-                lamp = probe(daemon, folder, '--frame-rate', '50')
-                while daemon.read_log().count(' as probe') == before:
-                    assert lamp.process.poll() is None, lamp.read_err()
-                    time.sleep(0.02)
-                time.sleep(0.7)
-                out, _ = lamp.interrupt()
-                count = re.search(r'camera: 0 whole pictures, (\d+) incomplete', out)
-                assert count and int(count.group(1)) > 3, (fault, out)
-                assert '0 environment frames sent' in out, out
+                for seconds in (0.7, 5, 20):  # the machine may be busy
+                    n_incomplete = count_lies(daemon, folder, seconds)
+                    if n_incomplete > 3:
+                        break
+                assert n_incomplete > 3, (fault, n_incomplete)
         for fault, word in (('codes', 'codes above those of Mono12'), ('huge', 'cannot')):
             with Camera(*size(), '--fault', fault):
                 _, err = probe(daemon, folder, '--pixel-format', 'Mono12').end(1)

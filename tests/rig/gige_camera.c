@@ -519,12 +519,15 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
 }
 
 /** Aravis' own camera, until the end. */
-static int run_stock(const char *serial, const char *genicam)
+static int run_stock(const char *serial, const char *genicam, struct gn_error *error)
 {
     ArvGvFakeCamera *camera = arv_gv_fake_camera_new_full("lo", serial, genicam);
     unlink(genicam);
     if (!camera || !arv_gv_fake_camera_is_running(camera))
-        return -EADDRINUSE;
+        return gn_error_set(error, -EADDRINUSE,
+                            "--stock: Aravis' camera does not start; is port %d "
+                            "in use?",
+                            GVCP_PORT);
     arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), fill, NULL);
     printf("ready\n");
     fflush(stdout);
@@ -588,7 +591,7 @@ int main(int argc, char *argv[])
     } else if (!err && !genicam) {
         err = gn_error_set(&error, -EIO, "cannot write its GenICam file");
     } else if (!err && gn_options_get_bool(options, NULL, NULL, "stock")) {
-        err = run_stock(gn_options_get_string(options, NULL, NULL, "serial"), genicam);
+        err = run_stock(gn_options_get_string(options, NULL, NULL, "serial"), genicam, &error);
     } else if (!err) {
         err = serve(options, genicam, &error);
     }
