@@ -283,7 +283,11 @@ def test_paces():
                 raise AssertionError((more, span))
         with open_room() as daemon:
             loop = replay(daemon, folder, '--loop', '--rate-factor', '5')
-            time.sleep(1.5)
+            deadline = time.monotonic() + 60
+            while daemon.read_log().count(' in room demo as ') < 5:  # the third round
+                assert time.monotonic() < deadline, 'never began again'
+                time.sleep(.05)
+            time.sleep(.2)  # to the end of its greeting
             loop.process.send_signal(signal.SIGINT)
             # A later round begins in the light of the one before: its first frame may differ.
             n = int(loop.succeed().splitlines()[-1].split(' streams')[0])

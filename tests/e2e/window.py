@@ -207,8 +207,10 @@ class Watch:
         try:
             return wait_for(what, look)
         except AssertionError:
-            with open('/tmp/gnomon-window-test.png', 'wb') as out:
+            with tempfile.NamedTemporaryFile(prefix='gnomon-window-test.', suffix='.png',
+                                             delete=False) as out:
                 out.write(png_bytes(*self.view.see()))
+            print('# the window is kept in ' + out.name)
             raise
 
     def wait_composite(self):
