@@ -90,7 +90,7 @@ class Machine:
         with open(self.at('initrd'), 'wb') as out:
             out.write(pack(files))
 
-    def run(self, script, timeout=240):
+    def run(self, script, timeout=500):
         """The guest's shell script: lines as step NAME COMMAND..."""
         self.make_initrd()
         out = self.at('out')
