@@ -471,7 +471,7 @@ def test_usage():
             (['probe', '--files', 'a', '--gige', 'any'], ['one of them']),
             (['probe', '--gige', 'any', '--rate', '5'], ['--frame-rate']),
             (['probe', '--gige', 'any', '--v4l2', 'any'], ['one camera']),
-            (['probe', '--gige', 'any', '--controls', 'a=1'], ['--v4l2']),
+            (['probe', '--files', 'a', '--controls', 'a=1'], ['for cameras']),
             (['probe', '--files', 'a', '--v4l2', 'any'], ['one of them']),
             (['probe', '--files', 'a', '--frame-size', '4x4'], ['for cameras']),
             (['view', '--files', 'a', '--out', 'o'], ['--camera FILE']),

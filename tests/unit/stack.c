@@ -14,7 +14,11 @@
 
 #include "common/image_file.h"
 #include "proto/attr.h"
+#include "tests/real_data.h"
 #include "tests/unit/cmocka_setup.h"
+
+/** In the folder GNOMON_DATA names. */
+#define MAPS "hdr/equirect/"
 
 #define WIDTH 256
 #define HEIGHT 128
@@ -192,19 +196,14 @@ static void test_synthetic_map(void **unused)
 static void test_photographed_map(void **unused)
 {
     (void)unused;
-    const char *data = getenv("GNOMON_DATA");
-    static const char *const names[] = {"studio_small_03_1k.hdr", "drachenfels_cellar_1k.hdr"};
-    if (!data) {
-        print_message("skipped: GNOMON_DATA is unset\n");
-        skip();
-    }
+    static const char *const names[] = {MAPS "studio_small_03_1k.hdr",
+                                        MAPS "drachenfels_cellar_1k.hdr"};
     for (size_t i = 0; i < GN_ARRAY_LEN(names); i++) {
-        char path[1024];
+        char path[PATH_MAX];
         struct gn_image_file file;
         struct gn_image map;
         struct gn_error e = {0};
-        snprintf(path, sizeof(path), "%s/hdr/equirect/%s", data, names[i]);
-        if (gn_image_read_file(path, &file, &e))
+        if (gn_image_read_file(real_data_path(names[i], path), &file, &e))
             fail_msg("%s", e.text);
         assert_int_equal(gn_image_init(&map, WIDTH, HEIGHT, 3), 0);
         for (int y = 0; y < HEIGHT; y++)
@@ -266,7 +265,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_synthetic_map),
-        cmocka_unit_test(test_photographed_map),
+        unit_test_with_real_data(test_photographed_map, MAPS "drachenfels_cellar_1k.hdr"),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
