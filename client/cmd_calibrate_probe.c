@@ -18,6 +18,7 @@
 #include "client/cmd.h"
 #include "common/device_json.h"
 #include "common/file.h"
+#include "common/image.h"
 #include "common/png.h"
 #include "proto/attr.h"
 
@@ -290,8 +291,13 @@ static int find_circle(struct run *run, struct gn_error *out_error)
     if (has(run, "ball")) {
         double xyr[3];
         int n = gn_calibrate_read_numbers("ball", get(run, "ball"), 0, 3, xyr, out_error);
-        if (n >= 0 && (n != 3 || !(xyr[2] > 5)))
-            n = gn_error_set(out_error, -EINVAL, "--ball: right would be X,Y,RADIUS in px");
+        if (n >= 0 &&
+            (n != 3 || !(xyr[2] > 5 && xyr[2] <= GN_IMAGE_MAX_SIDE &&
+                         fabs(xyr[0]) <= GN_IMAGE_MAX_SIDE && fabs(xyr[1]) <= GN_IMAGE_MAX_SIDE)))
+            n = gn_error_set(out_error, -EINVAL,
+                             "--ball: right would be X,Y,RADIUS in px, the radius above 5, none "
+                             "above %d",
+                             GN_IMAGE_MAX_SIDE);
         if (n < 0)
             return n;
         struct gn_circle guess = {{xyr[0], xyr[1]}, xyr[2], 0, 0};

@@ -279,6 +279,8 @@ def check_ball():
         setup = json.load(open(f.at('probe.json')))
         assert abs(setup['radius'] / math.sin(math.radians(60)) - 84.6) < .5, setup
         assert abs(setup['theta_max'] - math.radians(120)) < 1e-6 and 'mask' not in setup, setup
+        refuse('right would be X,Y,RADIUS', 'probe', '--files', f.at('ball.png'), '--projection',
+               'mirrorball', '--ball', '160,120,1e300', '--out', f.at('x.json'))
         refuse('no ball is seen near (60, 60)', 'probe', '--files', f.at('ball.png'), '--projection',
                'mirrorball', '--ball', '60,60,30', '--out', f.at('x.json'))
 
