@@ -43,6 +43,9 @@ static const char *find_misuse(const struct gn_options *options)
         !gn_options_is_set(options, NULL, NULL, "markers"))
         return "to track by markers give --markers FILE, --camera FILE, and --files PATTERN, "
                "--video FILE or a camera";
+    if (!gn_options_get_bool(options, NULL, NULL, "steady") &&
+        gn_options_get_double(options, NULL, NULL, "predict-ms") > 0)
+        return "--predict-ms predicts from steady poses: leave out --no-steady";
     return NULL;
 }
 

@@ -319,6 +319,11 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
         err = gn_poses_is_asked(options)
                   ? gn_poses_read_camera(camera_path, &v->camera, &has_place, out_error)
                   : gn_camera_read_file(camera_path, &v->camera, out_error);
+        if (!err && v->camera.response.type == GN_RESPONSE_TABLE)
+            err = gn_error_set(out_error, -EINVAL,
+                               "%s: camera frames travel with no table as response; right would "
+                               "be a formula, as gnomon calibrate response --as gamma finds it",
+                               camera_path);
         if (!err && pattern)
             err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
     }

@@ -210,7 +210,12 @@ def test_what_is_wrong_is_said():
         track = ['track', *files, '--object', 'cup']
         refuse(2, ['--markers'], *track)
         refuse(1, ['"cup"', 'markers.json'], *track, '--markers', desk.at('markers.json'))
+        refuse(2, ['--no-steady'], *track, '--markers', path, '--predict-ms', '20', '--no-steady')
         refuse(1, ['world_from_camera'], 'track', *files, '--object', 'a', '--markers', path)
+        camera = json.load(open(desk.at('camera.json')))
+        camera['response'] = {'type': 'table', 'table': [0, 1]}
+        refuse(1, ['table.json', '--as gamma'], 'view', '--files', desk.at('shots'), '--camera',
+               desk.write('table.json', json.dumps(camera)), '--marker', '4x4_50:7:0.05', '--out', desk.at('out'))
         # Pictures of another size than the camera's.
         with open(desk.at('shots/small.png'), 'wb') as small:
             small.write(png_bytes(8, 8, bytes(192)))
