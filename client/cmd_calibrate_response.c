@@ -245,20 +245,22 @@ static void print_points(const struct gn_chart_shot *shots, int n,
                          const struct gn_chart_response *r)
 {
     for (int k = 0; k < n; k++) {
-        int used = 0, clipped = 0;
+        int used = 0, clipped = 0, n_values = 0;
         double sum = 0;
         for (int i = 0; i < r->n_points; i++) {
             const struct gn_chart_point *p = &r->points[i];
             if (p->shot != k)
                 continue;
+            n_values++;
             clipped += p->is_clipped;
             bool is_sure = !p->is_clipped && !p->is_outlier && p->uncertainty < GN_CHART_SURE;
             used += is_sure;
             sum += is_sure ? p->error * p->error : 0;
         }
-        printf("%s: exposure %.4g, %d patches clipped; error %.2f %% RMS over %d sure to %.0f %%\n",
-               shots[k].name, r->time[k], clipped, 100 * sqrt(sum / (used > 0 ? used : 1)), used,
-               100 * GN_CHART_SURE);
+        printf("%s: exposure %.4g, %d of %d codes clipped; error %.2f %% RMS over %d sure to %.0f "
+               "%%\n",
+               shots[k].name, r->time[k], clipped, n_values,
+               100 * sqrt(sum / (used > 0 ? used : 1)), used, 100 * GN_CHART_SURE);
     }
     for (int i = 0; i < r->n_points; i++) {
         const struct gn_chart_point *p = &r->points[i];

@@ -151,7 +151,7 @@ static int fit_all(struct fit *f, struct gn_chart_response *r, struct gn_error *
     f->n_groups = f->n_channels * (f->has_times ? GN_CHART_PATCHES : f->n);
     if (f->n_samples < 4)
         return gn_error_set(out_error, -EDOM,
-                            "%d of %d patches are unclipped: too few; expose so that the chart's "
+                            "%d of %d codes are unclipped: too few; expose so that the chart's "
                             "codes lie between the rails",
                             f->n_samples, r->n_points);
     double unit = 0;
