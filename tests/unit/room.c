@@ -47,12 +47,17 @@ static void test_frames_allocate_nothing(void **state)
                                                          GN_MSG_PICTURE_FORMAT_JPEG};
     for (size_t f = 0; f < GN_ARRAY_LEN(formats); f++) {
         house.result_format = formats[f];
-        for (int i = 0; i < 3; i++)
-            draw();
-        long before = gn_test_n_allocations;
-        for (int i = 0; i < 20; i++)
-            draw();
-        assert_int_equal(gn_test_n_allocations - before, 0);
+        // A busy machine may keep a thread of the pool from its first tile for some frames.
+        long n = -1;
+        for (int round = 0; round < 5 && n != 0; round++) {
+            for (int i = 0; i < 3; i++)
+                draw();
+            long before = gn_test_n_allocations;
+            for (int i = 0; i < 20; i++)
+                draw();
+            n = gn_test_n_allocations - before;
+        }
+        assert_int_equal(n, 0);
     }
 }
 
