@@ -37,27 +37,34 @@ int gn_calibrate_read(const char *path, const struct gn_calibrate_format *format
                       struct gn_image *out_image, double *out_code_step, struct gn_error *out_error)
 {
     struct gn_image_file file = {.kind = GN_IMAGE_LINEAR};
-    struct gn_image image = {0};
     int err = gn_image_read_file(path, &file, out_error);
-    if (err)
-        return err;
-    err = gn_image_file_to_float(&file, format->full_scale16, &image);
-    bool is_linear = file.kind == GN_IMAGE_LINEAR;
-    int full_scale = format->full_scale16 > 0 ? format->full_scale16 : 65535;
-    double step = is_linear ? 0 : 1.0 / (file.kind == GN_IMAGE_CODES8 ? 255 : full_scale);
+    if (!err)
+        err = gn_calibrate_convert(path, &file, format, out_image, out_code_step, out_error);
     gn_image_file_finish(&file);
+    return err;
+}
+
+int gn_calibrate_convert(const char *name, const struct gn_image_file *file,
+                         const struct gn_calibrate_format *format, struct gn_image *out_image,
+                         double *out_code_step, struct gn_error *out_error)
+{
+    struct gn_image image = {0};
+    int err = gn_image_file_to_float(file, format->full_scale16, &image);
+    bool is_linear = file->kind == GN_IMAGE_LINEAR;
+    int full_scale = format->full_scale16 > 0 ? format->full_scale16 : 65535;
+    double step = is_linear ? 0 : 1.0 / (file->kind == GN_IMAGE_CODES8 ? 255 : full_scale);
     if (err)
-        return gn_error_set(out_error, err, "%s: out of memory", path);
+        return gn_error_set(out_error, err, "%s: out of memory", name);
     if (format->bayer && (image.channels != 1 || image.width < 2 || image.height < 2))
         err = gn_error_set(out_error, -EINVAL,
-                           "%s: --bayer is for gray pictures of at least 2 x 2 pixels", path);
+                           "%s: --bayer is for gray pictures of at least 2 x 2 pixels", name);
     else if (format->bayer && bin_mosaic(format->bayer, &image) < 0)
-        err = gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
+        err = gn_error_set(out_error, -ENOMEM, "%s: out of memory", name);
     for (long i = 0; !err && i < (long)image.width * image.height * image.channels; i++)
         if (!is_linear && image.data[i] > 1)
             err =
                 gn_error_set(out_error, -EINVAL, "%s: a code of %.0f is above the full scale of %d",
-                             path, (double)image.data[i] * full_scale, full_scale);
+                             name, (double)image.data[i] * full_scale, full_scale);
     if (err) {
         gn_image_finish(&image);
         return err;

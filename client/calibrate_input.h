@@ -10,6 +10,7 @@
 #include "client/capture/file.h"
 #include "common/error.h"
 #include "common/image.h"
+#include "common/image_file.h"
 #include "proto/attr.h"
 
 /** argv[0] is the command's name. Each returns the process's exit status. */
@@ -32,6 +33,12 @@ struct gn_calibrate_format {
 GN_MUST_USE int gn_calibrate_read(const char *path, const struct gn_calibrate_format *format,
                                   struct gn_image *out_image, double *out_code_step,
                                   struct gn_error *out_error);
+
+/** The same of a picture that is in memory, name what it is called in sentences. */
+GN_MUST_USE int gn_calibrate_convert(const char *name, const struct gn_image_file *file,
+                                     const struct gn_calibrate_format *format,
+                                     struct gn_image *out_image, double *out_code_step,
+                                     struct gn_error *out_error);
 
 /**
  * Shades of 8 bits, RGB, in which things can be found whatever the exposure: from the 1st to the

@@ -11,8 +11,8 @@
 #include <unistd.h>
 
 #include "client/calibrate/device_file.h"
-#include "client/calibrate/views.h"
 #include "client/calibrate_input.h"
+#include "client/calibrate_views.h"
 #include "client/cmd.h"
 #include "client/feature.h"
 #include "client/vision/boards.h"
@@ -20,14 +20,30 @@
 #include "common/png.h"
 #include "proto/attr.h"
 
+#define DEFAULT_VIEWS 15
+
 static const struct gn_option option_table[] = {
     {.key = "files",
      .flag = "files",
      .type = GN_OPTION_STRING,
      .value_name = "PATTERN",
-     .is_required = true,
      .help = "The pictures: a folder, a file or a pattern as 'shots/*.png'; all of one size, focus "
              "and zoom as later in use."},
+    GN_CALIBRATE_LIVE_OPTIONS,
+    {.key = "views",
+     .flag = "views",
+     .type = GN_OPTION_INT,
+     .min = GN_VIEWS_MIN,
+     .max = GN_BOARD_MAX_VIEWS,
+     .value_name = "N",
+     .help = "Camera or video: end with so many views, each of the board at rest and other than "
+             "all before; default 15. Ctrl-C ends with those that are there."},
+    {.key = "keep",
+     .flag = "keep",
+     .type = GN_OPTION_STRING,
+     .value_name = "DIR",
+     .help = "Camera or video: write the pictures of the views to this new folder, as PNG; --files "
+             "DIR then gives the same result again."},
     {.key = "board",
      .flag = "board",
      .type = GN_OPTION_STRING,
@@ -85,25 +101,21 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon calibrate intrinsics",
-    .usage = "--files PATTERN --board CxR --out camera.json [OPTION]...",
+    .usage = "--files PATTERN | --video FILE | --gige ID | --v4l2 DEVICE "
+             "--board CxR --out camera.json [OPTION]...",
     .summary = "Measures a camera's lens from 10 to 20 pictures of a flat board, tilted 20 to 45 "
                "degrees in all ways, near enough that it reaches the picture's corners in some.",
-    .notes = "Example:\n"
+    .notes = "Examples:\n"
              "  gnomon calibrate intrinsics --files 'shots/*.png' --board 10x7 \\\n"
-             "      --out camera.json --picture coverage.png\n",
+             "      --out camera.json --picture coverage.png\n"
+             "  gnomon calibrate intrinsics --gige any --board 10x7 --keep shots \\\n"
+             "      --out camera.json\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
 
 struct run {
-    struct gn_board board;
-    struct gn_file_list list;
-    struct gn_board_view views[GN_BOARD_MAX_VIEWS];
-    struct gn_board_corner *corners[GN_BOARD_MAX_VIEWS]; // [n_views], owned
-    double *residuals[GN_BOARD_MAX_VIEWS];               // [n_views], owned
-    int entry[GN_BOARD_MAX_VIEWS];                       // of the list
-    int n_views;
-    int width, height;
+    struct gn_calibrate_views set;
     struct gn_intrinsics intrinsics;
 };
 
@@ -125,62 +137,53 @@ static int read_board(const struct gn_options *options, struct gn_board *out,
     return gn_board_check(out, out_error);
 }
 
-/* Adds a view where the picture shows enough of the board. */
-static int look(struct run *run, int entry, struct gn_board_corner *found,
-                struct gn_error *out_error)
+static int look_all(struct run *run, const struct gn_options *options, struct gn_error *out_error)
 {
-    const char *path = run->list.entries[entry].path;
-    struct gn_image image = {0};
-    struct gn_image8 gray = {0};
-    int n = 0;
-    int err = gn_calibrate_read(path, &(struct gn_calibrate_format){0}, &image, NULL, out_error);
-    if (!err && run->width == 0) {
-        run->width = image.width;
-        run->height = image.height;
-    }
-    if (!err && (image.width != run->width || image.height != run->height))
-        err = gn_error_set(out_error, -EINVAL,
-                           "%s: %d x %d, but the first picture is %d x %d: all must be of one "
-                           "camera in one mode",
-                           path, image.width, image.height, run->width, run->height);
-    if (!err && gn_calibrate_stretch_gray(&image, &gray) < 0)
-        err = gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
-    if (!err)
-        err = gn_board_find(&run->board, gray.data, gray.width, gray.height, found, &n, out_error);
-    gn_image_finish(&image);
-    gn_image8_finish(&gray);
-    if (err || n < 8) {
+    static struct gn_board_corner found[GN_BOARD_MAX_CORNERS];
+    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
+    struct gn_file_list list = {0};
+    int err = gn_file_list_find(pattern, 1, &list, out_error);
+    if (!err && list.n_entries > GN_BOARD_MAX_VIEWS)
+        err = gn_error_set(out_error, -EINVAL, "%s: %d pictures, at most %d are taken", pattern,
+                           list.n_entries, GN_BOARD_MAX_VIEWS);
+    for (int i = 0; !err && i < list.n_entries; i++) {
+        const char *path = list.entries[i].path;
+        struct gn_image image = {0};
+        int n = 0;
+        err = gn_calibrate_read(path, &(struct gn_calibrate_format){0}, &image, NULL, out_error);
         if (!err)
+            err = gn_calibrate_views_look(&run->set, path, &image, found, &n, out_error);
+        if (err)
+            break;
+        if (n < GN_CALIBRATE_MIN_CORNERS)
             printf("%s: no board (%d corners)\n", path, n);
-        return err;
+        else
+            printf("%s: %d corners\n", path, n);
+        if (n >= GN_CALIBRATE_MIN_CORNERS)
+            err = gn_calibrate_views_add(&run->set, path, found, n, out_error);
     }
-    printf("%s: %d corners\n", path, n);
-    int v = run->n_views;
-    run->corners[v] = malloc((size_t)n * sizeof(*found));
-    run->residuals[v] = calloc(2 * (size_t)n, sizeof(double));
-    run->n_views++;
-    if (!run->corners[v] || !run->residuals[v])
-        return gn_error_set(out_error, -ENOMEM, "out of memory");
-    memcpy(run->corners[v], found, (size_t)n * sizeof(*found));
-    run->views[v] =
-        (struct gn_board_view){.corners = run->corners[v], .n = n, .residuals = run->residuals[v]};
-    run->entry[v] = entry;
-    return 0;
+    gn_file_list_finish(&list);
+    return err;
 }
 
-static int look_all(struct run *run, const char *pattern, struct gn_error *out_error)
+static int collect(struct run *run, const struct gn_options *options, struct gn_error *out_error)
 {
-    int err = gn_file_list_find(pattern, 1, &run->list, out_error);
-    struct gn_board_corner *found = calloc(GN_BOARD_MAX_CORNERS, sizeof(*found));
-    if (!err && !found)
-        err = gn_error_set(out_error, -ENOMEM, "out of memory");
-    if (!err && run->list.n_entries > GN_BOARD_MAX_VIEWS)
-        err = gn_error_set(out_error, -EINVAL, "%s: %d pictures, at most %d are taken", pattern,
-                           run->list.n_entries, GN_BOARD_MAX_VIEWS);
-    for (int i = 0; !err && i < run->list.n_entries; i++)
-        err = look(run, i, found, out_error);
-    free(found);
-    return err;
+    int n = gn_options_is_set(options, NULL, NULL, "views")
+                ? (int)gn_options_get_int(options, NULL, NULL, "views")
+                : DEFAULT_VIEWS;
+    return gn_calibrate_views_collect(&run->set, &program, options, n,
+                                      gn_options_get_string(options, NULL, NULL, "keep"),
+                                      out_error);
+}
+
+static const char *find_misuse(const struct gn_options *options)
+{
+    const char *misuse = gn_calibrate_find_misuse(options);
+    if (!misuse && !gn_calibrate_is_live(options) &&
+        (gn_options_is_set(options, NULL, NULL, "views") ||
+         gn_options_is_set(options, NULL, NULL, "keep")))
+        misuse = "--views and --keep are for cameras and videos; of files all are taken";
+    return misuse;
 }
 
 static void print_results(const struct run *run, const struct gn_views_figures *figures)
@@ -189,20 +192,21 @@ static void print_results(const struct run *run, const struct gn_views_figures *
     const struct gn_intrinsics *in = &run->intrinsics;
     double values[9] = {in->fx, in->fy, in->cx, in->cy};
     memcpy(values + 4, in->distortion, sizeof(in->distortion));
-    for (int v = 0; v < run->n_views; v++) {
+    for (int v = 0; v < run->set.n_views; v++) {
         double worst = 0;
-        for (int i = 0; i < run->views[v].n; i++)
-            worst = fmax(worst, hypot(run->residuals[v][2 * i], run->residuals[v][2 * i + 1]));
-        printf("%s: error %.3f px RMS, worst %.3f px, tilted %.0f degrees%s\n",
-               run->list.entries[run->entry[v]].path, run->views[v].rms_px, worst,
-               57.29577951308232 * acos(fmin(fabs(run->views[v].board_normal[2]), 1)),
-               run->views[v].rms_px > 2.5 * in->rms_px ? "  <- far above the others, look at it"
-                                                       : "");
+        for (int i = 0; i < run->set.views[v].n; i++)
+            worst =
+                fmax(worst, hypot(run->set.residuals[v][2 * i], run->set.residuals[v][2 * i + 1]));
+        printf("%s: error %.3f px RMS, worst %.3f px, tilted %.0f degrees%s\n", run->set.names[v],
+               run->set.views[v].rms_px, worst,
+               57.29577951308232 * acos(fmin(fabs(run->set.views[v].board_normal[2]), 1)),
+               run->set.views[v].rms_px > 2.5 * in->rms_px ? "  <- far above the others, look at it"
+                                                           : "");
     }
     for (int i = 0; i < 9; i++)
         printf("%s %.6g +- %.2g\n", names[i], values[i], in->deviation[i]);
     printf("error %.3f px RMS over %d views; corners in %.0f %% of the picture\n", in->rms_px,
-           run->n_views, 100 * figures->coverage);
+           run->set.n_views, 100 * figures->coverage);
 }
 
 static int write_results(const struct run *run, const struct gn_options *options,
@@ -212,7 +216,8 @@ static int write_results(const struct run *run, const struct gn_options *options
     const char *picture = gn_options_get_string(options, NULL, NULL, "picture");
     if (picture) {
         struct gn_image8 drawn = {0};
-        int err = gn_views_draw(run->views, run->n_views, run->width, run->height, 50, &drawn);
+        int err = gn_views_draw(run->set.views, run->set.n_views, run->set.width, run->set.height,
+                                50, &drawn);
         if (err)
             gn_error_set(out_error, err, "%s: out of memory", picture);
         else
@@ -223,11 +228,11 @@ static int write_results(const struct run *run, const struct gn_options *options
     }
     double k[4] = {in->fx, in->fy, in->cx, in->cy};
     json_t *numbers = gn_device_file_make_numbers(k, 4);
-    json_t *found =
-        json_pack("{s:i, s:i, s:O, s:O, s:O, s:O, s:o}", "width", run->width, "height", run->height,
-                  "fx", json_array_get(numbers, 0), "fy", json_array_get(numbers, 1), "cx",
-                  json_array_get(numbers, 2), "cy", json_array_get(numbers, 3), "distortion",
-                  gn_device_file_make_numbers(in->distortion, 5));
+    json_t *found = json_pack("{s:i, s:i, s:O, s:O, s:O, s:O, s:o}", "width", run->set.width,
+                              "height", run->set.height, "fx", json_array_get(numbers, 0), "fy",
+                              json_array_get(numbers, 1), "cx", json_array_get(numbers, 2), "cy",
+                              json_array_get(numbers, 3), "distortion",
+                              gn_device_file_make_numbers(in->distortion, 5));
     json_decref(numbers);
     const char *path = gn_options_get_string(options, NULL, NULL, "out");
     if (found && access(path, F_OK) != 0) {
@@ -246,19 +251,23 @@ static int calibrate(struct run *run, const struct gn_options *options, struct g
     struct gn_views_figures figures = {0};
     if (!gn_vision_is_built())
         return gn_feature_refuse(GN_FEATURE_VISION, out_error);
-    int err = read_board(options, &run->board, out_error);
+    int err = read_board(options, &run->set.board, out_error);
+    const char *misuse = find_misuse(options);
+    if (!err && misuse)
+        err = gn_error_set(out_error, -EINVAL, "%s", misuse);
     if (!err)
-        err = look_all(run, gn_options_get_string(options, NULL, NULL, "files"), out_error);
+        err = gn_calibrate_is_live(options) ? collect(run, options, out_error)
+                                            : look_all(run, options, out_error);
     if (!err)
-        err =
-            gn_views_check(run->views, run->n_views, run->width, run->height, &figures, out_error);
+        err = gn_views_check(run->set.views, run->set.n_views, run->set.width, run->set.height,
+                             &figures, out_error);
     if (!err)
-        err = gn_intrinsics_solve(&run->board, run->views, run->n_views, run->width, run->height,
-                                  gn_options_get_bool(options, NULL, NULL, "square-pixels"),
-                                  &run->intrinsics, out_error);
+        err = gn_intrinsics_solve(
+            &run->set.board, run->set.views, run->set.n_views, run->set.width, run->set.height,
+            gn_options_get_bool(options, NULL, NULL, "square-pixels"), &run->intrinsics, out_error);
     if (!err) {
         print_results(run, &figures);
-        err = gn_views_judge(&run->intrinsics, run->width,
+        err = gn_views_judge(&run->intrinsics, run->set.width,
                              gn_options_get_double(options, NULL, NULL, "max-error"), out_error);
     }
     return err ? err : write_results(run, options, out_error);
@@ -273,12 +282,8 @@ int gn_cmd_calibrate_intrinsics(int argc, char *const argv[])
         return ret == 0 ? 0 : 2;
     struct run *run = calloc(1, sizeof(*run));
     ret = run ? calibrate(run, options, &error) : gn_error_set(&error, -ENOMEM, "out of memory");
-    for (int v = 0; run && v < run->n_views; v++) {
-        free(run->corners[v]);
-        free(run->residuals[v]);
-    }
     if (run)
-        gn_file_list_finish(&run->list);
+        gn_calibrate_views_finish(&run->set);
     free(run);
     gn_options_destroy(&options);
     return ret ? gn_cmd_fail(&program, error.text) : 0;

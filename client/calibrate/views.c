@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 
 #include "client/calibrate/draw.h"
 #include "client/calibrate/solve.h"
@@ -52,10 +53,11 @@ static int count_cells(const struct gn_board_view *views, int n, int width, int 
 }
 
 /*
- * By how much the board's distance changes over the board, relative: the homography from the board
- * to the picture divides by it. Board coordinates centred and scaled to [-1, 1].
+ * By how much the board's distance changes over the board, relative, along its columns and its
+ * rows: the homography from the board to the picture divides by it. Board coordinates centred and
+ * scaled to [-1, 1].
  */
-static double get_tilt(const struct gn_board_view *view)
+static void get_tilts(const struct gn_board_view *view, double out_tilts[static 2])
 {
     double a[2 * GN_BOARD_MAX_CORNERS * 8] = {0}, b[2 * GN_BOARD_MAX_CORNERS], h[8];
     double mean[4] = {0}, size[4] = {1e-9, 1e-9, 1e-9, 1e-9};
@@ -84,9 +86,74 @@ static double get_tilt(const struct gn_board_view *view)
             b[2 * i + k] = t;
         }
     }
-    if (view->n < 4 || gn_solve_least_squares(a, b, 2 * view->n, 8, h) < 0)
-        return 0;
-    return 2 * hypot(h[6], h[7]);
+    bool is_known = view->n >= 4 && gn_solve_least_squares(a, b, 2 * view->n, 8, h) == 0;
+    for (int k = 0; k < 2; k++)
+        out_tilts[k] = is_known ? 2 * h[6 + k] : 0;
+}
+
+static double get_tilt(const struct gn_board_view *view)
+{
+    double tilts[2];
+    get_tilts(view, tilts);
+    return hypot(tilts[0], tilts[1]);
+}
+
+double gn_views_get_shift(const struct gn_board_view *a, const struct gn_board_view *b)
+{
+    const struct gn_board_corner *grid[32][32] = {{NULL}}; // boards have up to 33 squares a side
+    double largest = 0;
+    int n = 0;
+    for (int i = 0; i < a->n; i++)
+        grid[a->corners[i].row][a->corners[i].column] = &a->corners[i];
+    for (int i = 0; i < b->n; i++) {
+        const struct gn_board_corner *there = &b->corners[i];
+        const struct gn_board_corner *here = grid[there->row][there->column];
+        if (!here)
+            continue;
+        largest = fmax(largest, hypot(here->xy[0] - there->xy[0], here->xy[1] - there->xy[1]));
+        n++;
+    }
+    return n < 4 ? INFINITY : largest;
+}
+
+bool gn_views_are_alike(const struct gn_board_view *a, const struct gn_board_view *b, int width,
+                        int height)
+{
+    double s[2], t[2];
+    if (gn_views_get_shift(a, b) > GN_VIEWS_ALIKE_SHIFT * hypot(width, height))
+        return false;
+    get_tilts(a, s);
+    get_tilts(b, t);
+    return hypot(s[0] - t[0], s[1] - t[1]) < GN_VIEWS_ALIKE_TILT;
+}
+
+/* Which third of so many cells: the outer ones are a quarter of them and more. */
+static int get_third(int cell, int cells)
+{
+    int outer = (cells + 2) / 4;
+    return cell < outer ? 0 : cell >= cells - outer ? 2 : 1;
+}
+
+double gn_views_describe_bare(const struct gn_board_view *views, int n, int width, int height,
+                              char out_text[static GN_VIEWS_BARE_BYTES])
+{
+    static const char *const names[9] = {"top left",    "top",    "top right",
+                                         "left",        "middle", "right",
+                                         "bottom left", "bottom", "bottom right"};
+    bool is_hit[GN_VIEWS_ROWS][GN_VIEWS_COLUMNS] = {{false}};
+    int balance[9] = {0}; // cells without corners less those with
+    int n_hit = count_cells(views, n, width, height, is_hit);
+    size_t used = 0;
+    for (int y = 0; y < GN_VIEWS_ROWS; y++)
+        for (int x = 0; x < GN_VIEWS_COLUMNS; x++)
+            balance[3 * get_third(y, GN_VIEWS_ROWS) + get_third(x, GN_VIEWS_COLUMNS)] +=
+                is_hit[y][x] ? -1 : 1;
+    out_text[0] = '\0';
+    for (int i = 0; i < 9; i++)
+        if (balance[i] > 0)
+            used += (size_t)snprintf(out_text + used, GN_VIEWS_BARE_BYTES - used, "%s%s",
+                                     used ? ", " : "", names[i]);
+    return (double)n_hit / (GN_VIEWS_ROWS * GN_VIEWS_COLUMNS);
 }
 
 int gn_views_check(const struct gn_board_view *views, int n, int width, int height,

@@ -166,11 +166,45 @@ static int create_folder(void **unused)
     return gn_test_folder_create();
 }
 
+/* What makes a view new: the board elsewhere, or tilted otherwise; not a hand's tremor. */
+static void test_alike(void **unused)
+{
+    (void)unused;
+    struct gn_board_view a = see(0, 0.5, 0, 0, 0, 0.5), b = see(1, 0.5, 0, 0.005, 0, 0.5);
+    // Most where the board is nearest.
+    double shift = 600 * 0.005 / (0.5 - 2.5 * 0.025 * sin(0.5));
+    assert_true(fabs(gn_views_get_shift(&a, &b) - shift) < 1e-9);
+    assert_true(gn_views_are_alike(&a, &b, 640, 480));
+    b = see(1, 0.5, 0, 0.05, 0, 0.5);
+    assert_false(gn_views_are_alike(&a, &b, 640, 480));
+    b = see(1, 0.1, 0, 0, 0, 0.5);
+    assert_true(gn_views_get_shift(&a, &b) < GN_VIEWS_ALIKE_SHIFT * 800);
+    assert_false(gn_views_are_alike(&a, &b, 640, 480));
+    b = see(1, 0.5, 0, 0, 0, 0.5);
+    b.n = 3;
+    assert_true(isinf(gn_views_get_shift(&a, &b)) && isinf(gn_views_get_shift(&b, &a)));
+}
+
+static void test_bare(void **unused)
+{
+    (void)unused;
+    char text[GN_VIEWS_BARE_BYTES];
+    assert_true(gn_views_describe_bare(NULL, 0, 640, 480, text) == 0);
+    assert_string_equal(text, "top left, top, top right, left, middle, right, bottom left, bottom, "
+                              "bottom right");
+    // Corners from 80 to 560 px and from 90 to 390, 60 apart: columns 1 to 7 and rows 1 to 4.
+    struct gn_board_view view = see(0, 0, 0, 0, 0, 0.25);
+    assert_true(fabs(gn_views_describe_bare(&view, 1, 640, 480, text) - 28.0 / 48) < 1e-9);
+    assert_string_equal(text, "top left, bottom left");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_degenerate_views),
         cmocka_unit_test(test_boards),
+        cmocka_unit_test(test_alike),
+        cmocka_unit_test(test_bare),
         cmocka_unit_test(test_judgement),
         cmocka_unit_test_setup_teardown(test_device_files, create_folder, remove_folder),
     };
