@@ -15,15 +15,14 @@
 #include "client/calibrate/fisheye.h"
 #include "client/calibrate/spots.h"
 #include "client/calibrate_input.h"
+#include "client/calibrate_lamps.h"
 #include "client/cmd.h"
 #include "common/device_json.h"
-#include "common/file.h"
 #include "common/image.h"
 #include "common/png.h"
 #include "proto/attr.h"
 
 #define MAX_PICTURES 64
-#define MAX_LAMPS 256
 #define MAX_CANDIDATES 2048
 /* A ball mirrors the camera in its middle, as large as the camera seems from the ball. */
 #define DEFAULT_CAMERA_SHARE 0.12
@@ -132,16 +131,11 @@ static const struct gn_program program = {
     .n_options = GN_ARRAY_LEN(option_table),
 };
 
-struct lamp {
-    char picture[GN_FILE_NAME_BYTES]; // "*": all
-    double dir_world[3];
-};
-
 struct run {
     const struct gn_options *options;
     struct gn_probe_setup setup;
     struct gn_file_list list;
-    struct lamp lamps[MAX_LAMPS];
+    struct gn_lamp lamps[GN_LAMPS_MAX];
     int n_lamps;
     struct gn_fisheye_puzzle candidates[MAX_CANDIDATES];
     struct gn_fisheye_sighting sightings[MAX_CANDIDATES];
@@ -196,52 +190,6 @@ static int read_setup(struct run *run, struct gn_error *out_error)
                             "a %s picture has no circle and nothing to calibrate",
                             gn_projection_get_name(run->setup.projection.type));
     return 0;
-}
-
-/* One line of the lamps' file; blank and comment lines are none. */
-static int read_lamp(struct run *run, const char *line, int number, struct gn_error *out_error)
-{
-    char name[GN_FILE_NAME_BYTES], rest;
-    double d[3];
-    if (line[strspn(line, " \t\r")] == '\0' || line[strspn(line, " \t")] == '#')
-        return 0;
-    struct lamp *lamp = &run->lamps[run->n_lamps];
-    double norm = 0;
-    if (sscanf(line, "%255s %lf %lf %lf %c", name, &d[0], &d[1], &d[2], &rest) == 4)
-        norm = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    if (!(norm > 1e-9 && norm < 1e9))
-        return gn_error_set(out_error, -EINVAL,
-                            "%s, line %d: right would be PICTURE X Y Z, the way to the lamp, not 0",
-                            get(run, "lamps"), number);
-    if (run->n_lamps == MAX_LAMPS)
-        return gn_error_set(out_error, -E2BIG, "%s: more than %d lamps", get(run, "lamps"),
-                            MAX_LAMPS);
-    gn_file_get_name(name, lamp->picture);
-    for (int k = 0; k < 3; k++)
-        lamp->dir_world[k] = d[k] / norm;
-    run->n_lamps++;
-    return 0;
-}
-
-static int read_lamps(struct run *run, struct gn_error *out_error)
-{
-    char *text = NULL;
-    size_t size = 0;
-    int err = gn_file_read_text(get(run, "lamps"), (size_t)1 << 20, &text, &size, out_error);
-    if (err)
-        return err;
-    int number = 1;
-    for (char *line = text; !err && *line; number++) {
-        char *end = line + strcspn(line, "\n");
-        bool is_last = *end == '\0';
-        *end = '\0';
-        err = read_lamp(run, line, number, out_error);
-        line = is_last ? end : end + 1;
-    }
-    free(text);
-    if (!err && run->n_lamps == 0)
-        err = gn_error_set(out_error, -EINVAL, "%s: no lamp in it", get(run, "lamps"));
-    return err;
 }
 
 static int read_picture(struct run *run, int i, struct gn_image *out, struct gn_error *out_error)
@@ -349,7 +297,7 @@ static int look_for_lamps(struct run *run, int i, const struct gn_image *light,
     printf("%s: %d bright spots, %d lamps\n", run->list.entries[i].path, n, n_here);
     for (int s = 0; s < n; s++)
         for (int k = 0; k < run->n_lamps && run->n_candidates < MAX_CANDIDATES; k++) {
-            const struct lamp *lamp = &run->lamps[k];
+            const struct gn_lamp *lamp = &run->lamps[k];
             if (strcmp(lamp->picture, "*") != 0 && strcmp(lamp->picture, name) != 0)
                 continue;
             struct gn_fisheye_puzzle *c = &run->candidates[run->n_candidates++];
@@ -480,8 +428,10 @@ static int calibrate(struct run *run, struct gn_error *out_error)
     if (has_circle && has_ball)
         return gn_error_set(out_error, -EINVAL, "--find-circle is for fisheyes, --ball for balls");
     int err = read_setup(run, out_error);
-    if (!err && has_lamps)
-        err = read_lamps(run, out_error);
+    if (!err && has_lamps) {
+        run->n_lamps = gn_lamps_read_file(get(run, "lamps"), run->lamps, out_error);
+        err = run->n_lamps < 0 ? run->n_lamps : 0;
+    }
     if (!err)
         err = read_all(run, out_error);
     if (!err && (has_circle || has_ball))
