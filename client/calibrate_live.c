@@ -62,6 +62,7 @@ static int decode(const struct gn_capture *capture, struct gn_image8 *out,
 static int convert(const struct gn_capture *capture, struct gn_image_file *out, int *out_full_scale,
                    struct gn_error *out_error)
 {
+    const size_t values = (size_t)capture->width * (size_t)capture->height;
     bool is_12 = false;
     int channels = 3, err = 0;
     switch (capture->format) {
@@ -75,7 +76,7 @@ static int convert(const struct gn_capture *capture, struct gn_image_file *out, 
         out->kind = GN_IMAGE_CODES8;
         err = gn_image8_init(&out->codes8, capture->width, capture->height, 3);
         if (!err)
-            memcpy(out->codes8.data, capture->data, capture->data_bytes);
+            memcpy(out->codes8.data, capture->data, 3 * values);
         break;
     case GN_CAPTURE_MONO12:
     case GN_CAPTURE_MONO16:
@@ -87,7 +88,7 @@ static int convert(const struct gn_capture *capture, struct gn_image_file *out, 
         out->kind = GN_IMAGE_CODES16;
         err = gn_image16_init(&out->codes16, capture->width, capture->height, channels);
         if (!err)
-            memcpy(out->codes16.data, capture->data, capture->data_bytes);
+            memcpy(out->codes16.data, capture->data, 2 * values * (size_t)channels);
         break;
     }
     return err ? gn_error_set(out_error, err, "out of memory") : 0;
