@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-#include "client/calibrate_views.h"
+#include "client/calibrate_collect.h"
 
 #include <errno.h>
 #include <math.h>

@@ -4,8 +4,8 @@
  * The views of a board that gnomon calibrate intrinsics fits a camera to: of pictures given, or
  * picked from a camera's as they come.
  */
-#ifndef GN_CLIENT_CALIBRATE_SET_H
-#define GN_CLIENT_CALIBRATE_SET_H
+#ifndef GN_CLIENT_CALIBRATE_COLLECT_H
+#define GN_CLIENT_CALIBRATE_COLLECT_H
 
 #include "client/calibrate/views.h"
 #include "client/calibrate_live.h"

@@ -12,7 +12,7 @@
 
 #include "client/calibrate/device_file.h"
 #include "client/calibrate_input.h"
-#include "client/calibrate_views.h"
+#include "client/calibrate_collect.h"
 #include "client/cmd.h"
 #include "client/feature.h"
 #include "client/vision/boards.h"
