@@ -354,7 +354,9 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/** The corners of a tag of that side as a stored pose, 4 rows of 4, has them in the picture. */
+/** The corners of a tag of that side as a stored pose, 4 rows of 4, has them in the picture, pixel
+ * centres at whole numbers: the AprilTag library, whose corners the poses fit, has them half a
+ * pixel further. */
 static void project_stored(const json_t *rows, double size, const double k[static 4],
                            double out[4][2])
 {
@@ -367,8 +369,8 @@ static void project_stored(const json_t *rows, double size, const double k[stati
                    signs[i][1] * size / 2 * json_number_value(json_array_get(row, 1)) +
                    json_number_value(json_array_get(row, 3));
         }
-        out[i][0] = k[2] + k[0] * p[0] / p[2];
-        out[i][1] = k[3] + k[1] * p[1] / p[2];
+        out[i][0] = k[2] - 0.5 + k[0] * p[0] / p[2];
+        out[i][1] = k[3] - 0.5 + k[1] * p[1] / p[2];
     }
 }
 
@@ -423,7 +425,7 @@ static void stored_poses_of_visp_rbt_reproject(void **state)
                   "our corners (median), %.2f (90 %%); our own poses within %.2f RMS\n",
                   n, n_expected, distances[n / 2], distances[n * 9 / 10], own[n_own / 2]);
     assert_true(n_expected > 200 && n > n_expected * 95 / 100);
-    assert_true(distances[n / 2] < 1);
+    assert_true(distances[n / 2] < 0.6); // half a pixel in both axes would be 0.7 more
     assert_true(own[n_own / 2] < 1);
 }
 
