@@ -40,6 +40,15 @@ GN_MUST_USE int gn_calibrate_take(const struct gn_program *program, struct gn_so
                                   struct gn_image_file *out, int *out_full_scale,
                                   struct gn_error *out_error);
 
+/**
+ * The mean of n pictures, codes over full scale as gn_calibrate_read has them. full_scale16: 0, or
+ * the largest code of 16-bit pictures where that is not the one of their format. Returns 0, or a
+ * negative errno and a sentence: -EINTR where fewer came. The caller finishes *out_image.
+ */
+GN_MUST_USE int gn_calibrate_take_mean(const struct gn_program *program, struct gn_source *source,
+                                       int n, int full_scale16, struct gn_image *out_image,
+                                       double *out_code_step, struct gn_error *out_error);
+
 /** Makes the folder where there is none. Returns 0, or a negative errno and a sentence: -EEXIST
  * where it has pictures already. */
 GN_MUST_USE int gn_calibrate_make_folder(const char *option, const char *path,

@@ -16,6 +16,7 @@
 #include "client/calibrate/spots.h"
 #include "client/calibrate_input.h"
 #include "client/calibrate_lamps.h"
+#include "client/calibrate_live.h"
 #include "client/cmd.h"
 #include "common/device_json.h"
 #include "common/image.h"
@@ -34,8 +35,16 @@ static const struct gn_option option_table[] = {
      .flag = "files",
      .type = GN_OPTION_STRING,
      .value_name = "PATTERN",
-     .is_required = true,
      .help = "The probe's pictures: a folder, a file or a pattern; the probe at rest."},
+    GN_CALIBRATE_LIVE_OPTIONS,
+    {.key = "frames",
+     .flag = "frames",
+     .type = GN_OPTION_INT,
+     .min = 1,
+     .max = 10000,
+     .value_name = "N",
+     .help = "Camera or video: take the mean of so many pictures; default 1. In the lamps' file "
+             "it is called camera."},
     {.key = "out",
      .flag = "out",
      .type = GN_OPTION_STRING,
@@ -119,14 +128,17 @@ static const struct gn_option option_table[] = {
 
 static const struct gn_program program = {
     .name = "gnomon calibrate probe",
-    .usage = "--files PATTERN --out probe.json [OPTION]...",
+    .usage = "--files PATTERN | --video FILE | --gige ID | --v4l2 DEVICE "
+             "--out probe.json [OPTION]...",
     .summary = "Measures a light probe: a fisheye's circle, lens and orientation against the "
                "marker, or a mirror ball's place in its picture.",
     .notes = "Examples:\n"
              "  gnomon calibrate probe --files 'lamp*.png' --find-circle \\\n"
              "      --projection fisheye-equidistant --lamps lamps.txt --out probe.json\n"
              "  gnomon calibrate probe --files ball.png --projection mirrorball \\\n"
-             "      --ball 320,240,150 --out probe.json --picture ball-found.png\n",
+             "      --ball 320,240,150 --out probe.json --picture ball-found.png\n"
+             "  gnomon calibrate probe --gige any --frames 16 --find-circle \\\n"
+             "      --projection fisheye-equidistant --out probe.json\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
@@ -192,13 +204,33 @@ static int read_setup(struct run *run, struct gn_error *out_error)
     return 0;
 }
 
+/* The mean of a camera's or video's pictures. */
+static int take_picture(struct run *run, struct gn_image *out, struct gn_error *out_error)
+{
+    const struct gn_projection *p = &run->setup.projection;
+    const struct gn_live_options wanted = {.width = p->width, .height = p->height};
+    struct gn_source *source = NULL;
+    int n = has(run, "frames") ? (int)gn_options_get_int(run->options, NULL, NULL, "frames") : 1;
+    int full_scale = has(run, "full-scale")
+                         ? (int)gn_options_get_int(run->options, NULL, NULL, "full-scale")
+                         : 0;
+    gn_cmd_catch_signals();
+    int err = gn_calibrate_open(run->options, &wanted, &source, out_error);
+    if (!err)
+        err = gn_calibrate_take_mean(&program, source, n, full_scale, out, &run->step, out_error);
+    gn_source_close(&source);
+    return err;
+}
+
 static int read_picture(struct run *run, int i, struct gn_image *out, struct gn_error *out_error)
 {
     const char *path = run->list.entries[i].path;
     struct gn_calibrate_format format = {.full_scale16 = run->setup.is_12_bit ? 4095 : 65535};
     if (has(run, "full-scale"))
         format.full_scale16 = gn_options_get_int(run->options, NULL, NULL, "full-scale");
-    int err = gn_calibrate_read(path, &format, out, &run->step, out_error);
+    int err = gn_calibrate_is_live(run->options)
+                  ? take_picture(run, out, out_error)
+                  : gn_calibrate_read(path, &format, out, &run->step, out_error);
     struct gn_projection *p = &run->setup.projection;
     if (!err && p->width == 0 && p->height == 0) {
         p->width = out->width;
@@ -310,7 +342,12 @@ static int look_for_lamps(struct run *run, int i, const struct gn_image *light,
 
 static int read_all(struct run *run, struct gn_error *out_error)
 {
-    int err = gn_file_list_find(get(run, "files"), 1, &run->list, out_error);
+    struct gn_file_entry *live;
+    int err = 0;
+    if (!gn_calibrate_is_live(run->options))
+        err = gn_file_list_find(get(run, "files"), 1, &run->list, out_error);
+    else if (gn_file_list_add(&run->list, "camera", &live) < 0)
+        err = gn_error_set(out_error, -ENOMEM, "out of memory");
     if (!err && run->list.n_entries > MAX_PICTURES)
         err = gn_error_set(out_error, -E2BIG, "%s: %d pictures, at most %d are taken",
                            get(run, "files"), run->list.n_entries, MAX_PICTURES);
@@ -427,7 +464,10 @@ static int calibrate(struct run *run, struct gn_error *out_error)
                             "nothing to find: give --find-circle, --ball or --lamps");
     if (has_circle && has_ball)
         return gn_error_set(out_error, -EINVAL, "--find-circle is for fisheyes, --ball for balls");
-    int err = read_setup(run, out_error);
+    const char *misuse = gn_calibrate_find_misuse(run->options);
+    if (!misuse && has(run, "frames") && !gn_calibrate_is_live(run->options))
+        misuse = "--frames is for cameras and videos; of files all are taken";
+    int err = misuse ? gn_error_set(out_error, -EINVAL, "%s", misuse) : read_setup(run, out_error);
     if (!err && has_lamps) {
         run->n_lamps = gn_lamps_read_file(get(run, "lamps"), run->lamps, out_error);
         err = run->n_lamps < 0 ? run->n_lamps : 0;

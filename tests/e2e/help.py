@@ -32,7 +32,7 @@ OPTIONS = [
                                                   'views', 'keep'}),
     ([GNOMON, 'calibrate', 'response'], {'chart', 'stack', 'times', 'model', 'method', 'as', 'corners', 'out',
                                          'full-scale', 'bayer', 'matrix', 'plot', 'radiance'}),
-    ([GNOMON, 'calibrate', 'probe'], {'files', 'out', 'projection', 'theta-max', 'find-circle', 'ball',
+    ([GNOMON, 'calibrate', 'probe'], LIVE | {'files', 'video', 'frames', 'out', 'projection', 'theta-max', 'find-circle', 'ball',
                                       'camera-share', 'lamps', 'fit', 'share', 'tolerance', 'full-scale',
                                       'picture'}),
     ([GNOMOND], {'config', 'listen', 'http', 'ready-file', 'print-config', 'threads', 'log', '*'}),
