@@ -215,6 +215,7 @@ static int find_place(struct run *run, struct gn_error *out_error)
 static int measure(struct run *run, struct gn_chart_shot *shots, struct gn_error *out_error)
 {
     int err = 0;
+    bool is_turned = false; // where the chart is seen best
     double best = -1;
     for (int k = 0; !err && k < run->list.n_entries; k++) {
         const char *path = run->list.entries[k].path;
@@ -227,9 +228,12 @@ static int measure(struct run *run, struct gn_chart_shot *shots, struct gn_error
         shots[k] = (struct gn_chart_shot){.name = path, .time = run->has_times ? run->times[k] : 0};
         err = gn_chart_measure(&image, &run->place, RAIL, shots[k].patches, &why);
         struct gn_chart_place as_it_lies = run->place;
-        if (!err)
-            best = fmax(best, gn_chart_orient(&image, &as_it_lies));
-        else
+        double fit = err ? -1 : gn_chart_orient(&image, &as_it_lies);
+        if (fit > best) {
+            best = fit;
+            is_turned = memcmp(&as_it_lies, &run->place, sizeof(as_it_lies)) != 0;
+        }
+        if (err)
             gn_error_set(out_error, err, "%s: %s", path, why.text);
         gn_image_finish(&image);
     }
@@ -238,6 +242,10 @@ static int measure(struct run *run, struct gn_chart_shot *shots, struct gn_error
                            "what lies at --corners is no colour chart (rank correlation with its "
                            "greys and colours %.2f at best, above 0.8 is right)",
                            best);
+    if (!err && best >= 0.8 && is_turned)
+        err = gn_error_set(out_error, -EDOM,
+                           "the chart lies another way: --corners are the centres of the patches "
+                           "dark skin, bluish green, black and white, in this order");
     return err;
 }
 

@@ -29,8 +29,8 @@
          .flag = "marker",                                                                         \
          .type = GN_OPTION_STRING,                                                                 \
          .value_name = "DICT:ID:SIZE",                                                             \
-         .help = "Instead of --markers: one marker, whose middle is the world's origin, such as "  \
-                 "4x4_50:7:0.05 (its side in metres)."},                                           \
+         .help = "Instead of --markers, of gnomon view: one marker, whose middle is the world's "  \
+                 "origin, such as 4x4_50:7:0.05 (its side in metres)."},                           \
         {.key = "steady",                                                                          \
          .flag = "steady",                                                                         \
          .type = GN_OPTION_BOOL,                                                                   \

@@ -367,6 +367,13 @@ int gn_chart_fit_matrix(const double device[static 72], bool keeps_white,
             m.worst_grey = fmax(m.worst_grey, m.error[j]);
     }
     m.rms = sqrt(sum / n);
+    if (!(m.rms <= GN_CHART_MAX_ERROR))
+        return gn_error_set(
+            out_error, -EDOM,
+            "no matrix makes the chart's colours of these: the best is %.0f %% off "
+            "(RMS, at most %.0f %% is right); is the light white, and are all three "
+            "channels open? --no-matrix leaves it out",
+            100 * m.rms, 100 * GN_CHART_MAX_ERROR);
     *out_matrix = m;
     return 0;
 }

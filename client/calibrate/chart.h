@@ -72,6 +72,9 @@ struct gn_chart_matrix {
 
 /** Largest condition number a matrix may have. */
 #define GN_CHART_MAX_CONDITION 1e3
+/** Largest error of a matrix, RMS over its patches: colours under white light are within a few
+ * percent. */
+#define GN_CHART_MAX_ERROR 0.25
 
 /**
  * Minimises sum w |A x_j - rho_j|^2, w = 1 / (rho_Y + 0.02)^2, by QR, such that white stays white

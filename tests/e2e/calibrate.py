@@ -144,6 +144,10 @@ def check_chart():
                1000, '--corners', CORNERS, '--out', f.at('x.json'))
         refuse('lies outside', 'response', '--chart', f.at('chart*.png'), '--full-scale', 4095,
                '--corners', '0,0,9e3,0,9e3,9e3,0,9e3', '--out', f.at('x.json'))
+        turned = CORNERS.split(',')
+        turned = ','.join(turned[4:] + turned[:4])
+        refuse('the chart lies another way', 'response', '--chart', f.at('chart*.png'), '--times', listed,
+               '--full-scale', 4095, '--corners', turned, '--no-matrix', '--out', f.at('x.json'))
         refuse('8 numbers', 'response', '--chart', f.at('chart*.png'), '--full-scale', 4095,
                '--corners', '0,0,9', '--out', f.at('x.json'))
         refuse('number 2 is none', 'response', '--chart', f.at('chart*.png'), '--times', '1,two',

@@ -7,11 +7,13 @@ unsigned gn_gige_pattern(int x, int y, int c, uint64_t id)
     return (unsigned)(7 * x + 131 * y + 1009 * c + (int)(id % 4096) * 29) & 4095;
 }
 
-/** The 12-bit code of one sample. */
+/** The 12-bit code of one sample; 0 outside the picture: a client may ask for more than it has. */
 static unsigned get_code(const struct gn_image16 *picture, uint64_t id, int x, int y, int c)
 {
     if (!picture)
         return gn_gige_pattern(x, y, c, id);
+    if (x >= picture->width || y >= picture->height)
+        return 0;
     size_t at = ((size_t)y * (size_t)picture->width + (size_t)x) * (size_t)picture->channels;
     return picture->data[at + (picture->channels == 3 ? (size_t)c : 0)];
 }
