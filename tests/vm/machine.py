@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the Gnomon authors
 # SPDX-License-Identifier: ISC
-"""A virtual machine with Debian's kernel and its virtual camera, in which programs of this one run.
+"""A virtual machine with Debian's kernel and a virtual camera, in which programs of this one run.
 
 Nothing of the host is needed but QEMU: the processor is emulated (no /dev/kvm, no root), the root
 file system is the host's own, read only. 10.0.2.2 in the guest is the host's loopback.
@@ -12,15 +12,16 @@ import subprocess
 import tempfile
 
 TOOLS = ('qemu-system-x86_64', 'busybox', 'v4l2-ctl')
+# Drivers of cameras, and what makes each have one, /dev/video0.
+DRIVERS = {'vivid': 'n_devs=1 node_types=0x1', 'v4l2loopback': 'video_nr=0 exclusive_caps=1 max_buffers=4'}
 
 INIT = r"""#!/bin/busybox sh
 /bin/busybox --install -s /bin
 mount -t proc p /proc
 mount -t sysfs s /sys
 mount -t devtmpfs d /dev
-while read m; do
-    case $m in vivid.ko) p="n_devs=1 node_types=0x1" ;; *) p= ;; esac
-    insmod /modules/$m $p
+while read module parameters; do
+    insmod /modules/$module $parameters
 done </modules/order
 ip link set lo up
 ip link set eth0 up
@@ -43,13 +44,15 @@ step() { name=$1; shift; "$@" >"$name.out" 2>"$name.err" </dev/null; echo $? >"$
 """
 
 
-def find_missing(kernel):
-    """Why no machine can be started here; None: it can."""
+def find_missing(kernel, driver='vivid'):
+    """Why no machine with this camera can be started here; None: it can."""
     for tool in TOOLS:
         if not shutil.which(tool):
             return tool + ' is not installed'
     if not os.path.exists(os.path.join(kernel, 'modules', 'order')):
         return 'no kernel in %s; tests/vm/fetch-kernel fetches it' % kernel
+    if not os.path.exists(os.path.join(kernel, 'modules', driver + '.ko')):
+        return 'no %s in %s; tests/vm/fetch-kernel fetches it' % (driver, kernel)
     return None
 
 
@@ -72,8 +75,8 @@ def read(path):
 class Machine:
     """Runs one script of steps; what each said is then at hand. Files written to . are in path."""
 
-    def __init__(self, kernel):
-        self.kernel = kernel
+    def __init__(self, kernel, driver='vivid'):
+        self.kernel, self.driver = kernel, driver
         self.path = tempfile.mkdtemp(prefix='gnomon-vm.')
 
     def at(self, name):
@@ -85,8 +88,12 @@ class Machine:
                  ('bin', 'dev', 'proc', 'sys', 'host', 'modules')]
         files += [('init', 0o100755, INIT.encode()),
                   ('bin/busybox', 0o100755, read(shutil.which('busybox')))]
+        needed = read(os.path.join(modules, 'order')).decode().split()
+        needed = [name for name in needed if name != 'vivid.ko'] + [self.driver + '.ko']
         files += [('modules/' + name, 0o100644, read(os.path.join(modules, name)))
-                  for name in os.listdir(modules)]
+                  for name in needed]
+        order = '\n'.join(needed) + ' ' + DRIVERS[self.driver] + '\n'
+        files += [('modules/order', 0o100644, order.encode())]
         with open(self.at('initrd'), 'wb') as out:
             out.write(pack(files))
 
@@ -108,11 +115,14 @@ class Machine:
             '-virtfs', 'local,path=/,mount_tag=root,security_model=none,readonly=on,'
                        'multidevs=remap',
             '-netdev', 'user,id=n', '-device', 'virtio-net-pci,netdev=n,romfile=']
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, timeout=timeout)
+        try:
+            said = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                  stderr=subprocess.STDOUT, timeout=timeout).stdout
+        except subprocess.TimeoutExpired:
+            said = b'not within %d s' % timeout
         if not os.path.exists(os.path.join(out, 'end.rc')):
             raise AssertionError('the machine did not come to its end: %s\n%s' % (
-                done.stdout.decode('utf-8', 'replace'),
+                said.decode('utf-8', 'replace'),
                 read(self.at('console')).decode('utf-8', 'replace')[-4000:]))
 
     def get(self, name):
