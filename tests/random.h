@@ -6,6 +6,7 @@
 #ifndef GN_TESTS_RANDOM_H
 #define GN_TESTS_RANDOM_H
 
+#include <math.h>
 #include <stdint.h>
 
 /** SplitMix64; *state is the seed at first.
@@ -22,6 +23,14 @@ static inline uint64_t gn_test_random(uint64_t *state)
 static inline double gn_test_random_unit(uint64_t *state)
 {
     return (double)(gn_test_random(state) >> 11) * 0x1p-53;
+}
+
+/** Normal, mean 0 and deviation 1.
+ * Source: Box, Muller, "A note on the generation of random normal deviates", 1958. */
+static inline double gn_test_random_normal(uint64_t *state)
+{
+    double radius = sqrt(-2 * log(1 - gn_test_random_unit(state)));
+    return radius * cos(2 * M_PI * gn_test_random_unit(state));
 }
 
 #endif

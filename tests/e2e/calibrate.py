@@ -9,12 +9,11 @@ import json
 import math
 import os
 import re
-import shutil
 import struct
 import subprocess
 import sys
-import tempfile
 
+from folder import Folder
 from pictures import png_bytes
 
 GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[1]
@@ -33,23 +32,6 @@ A, B, C = 0.6, 0.07, 2e-4
 
 class Skip(Exception):
     pass
-
-
-class Folder:
-    def __enter__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-calibrate-test.')
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
-        return self.at(name)
 
 
 def calibrate(*arguments):

@@ -8,15 +8,14 @@ import json
 import math
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 import own_network  # noqa: E402
+from folder import Folder  # noqa: E402
 from pictures import png_bytes, read_png  # noqa: E402
 
 GNOMON, FAKE = sys.argv[1:3]
@@ -28,22 +27,6 @@ BOARD = ['--board', '%dx%d' % (COLUMNS, ROWS), '--square-pixels']
 # Of the board: turns about its two sides, and where its middle is, in squares.
 VIEWS = [(.5, 0, 0, 0, 11), (-.5, .1, -1.4, -.8, 11), (0, .5, 1.4, 1, 11), (.1, -.5, -1.4, 1, 11),
          (.4, .4, 1.5, -.8, 11), (-.4, .4, 0, .4, 10), (-.3, -.4, 0, -.5, 10)]
-
-
-class Folder:
-    def __enter__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-calibrate-live-test.')
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
 
 
 class Camera:

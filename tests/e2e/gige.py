@@ -8,7 +8,6 @@ usage: gige.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON FAKE_GIGE GIGE_TOOL
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.insert(0, sys.argv[2])
 import own_network  # noqa: E402
+from folder import Folder  # noqa: E402
 from gnomond import Daemon, run_tests  # noqa: E402
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
 
@@ -86,25 +86,11 @@ class Program:
         return out, err
 
 
-class Folder:
+class Given(Folder):
     def __init__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-gige-test.')
+        super().__init__()
         self.write('setup.json', json.dumps(SETUP).encode())
         self.write('camera.json', json.dumps(CAMERA).encode())
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
-        return self.at(name)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
 
 
 def size(width=WIDTH, height=HEIGHT):
@@ -205,7 +191,7 @@ def test_times():
 
 def test_restart():
     """The camera is killed and comes back: pictures within 2 s, and nobody else notices."""
-    with Daemon() as daemon, Folder() as folder, Camera(*size()) as camera:
+    with Daemon() as daemon, Given() as folder, Camera(*size()) as camera:
         lamp = probe(daemon, folder, '--frame-rate', '25')
         lamp.wait_for('environment frame 5:')
         os.mkdir(folder.at('shots'))
@@ -244,7 +230,7 @@ def test_restart():
 
 def test_view():
     """A camera's pictures as camera frames: composites of the camera's pixels."""
-    with Daemon() as daemon, Folder() as folder:
+    with Daemon() as daemon, Given() as folder:
         folder.write('a.png', png_bytes(WIDTH, HEIGHT, bytes([16, 160, 80]) * WIDTH * HEIGHT))
         subprocess.run([GNOMON, 'probe', server(daemon), '--files',
                         folder.write('light.exr', exr_bytes(32, 16, (1, 1, 1)))], check=True,
@@ -296,7 +282,7 @@ def count_lies(daemon, folder, seconds):
 
 def test_hostile():
     """Cameras that lie: no picture of theirs is given out; the daemon sees nothing of it."""
-    with Daemon() as daemon, Folder() as folder:
+    with Daemon() as daemon, Given() as folder:
         for fault in ('size', 'format', 'truncated'):
             with Camera(*size(), '--fault', fault):
                 for seconds in (0.7, 5, 20):  # the machine may be busy
@@ -313,7 +299,7 @@ def test_hostile():
 
 def test_settings():
     """What a camera cannot do is refused by name; without a camera it is said."""
-    with Daemon() as daemon, Folder() as folder:
+    with Daemon() as daemon, Given() as folder:
         with Camera(*size()):
             for option, words in (('--pixel-format=Fancy', ['--pixel-format', 'Fancy']),
                                   ('--controls=GainRaw=1,Nope=2', ['--controls Nope=2']),

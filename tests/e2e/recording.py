@@ -8,7 +8,6 @@ import json
 import os
 import random
 import resource
-import shutil
 import signal
 import struct
 import subprocess
@@ -18,6 +17,7 @@ import time
 import zlib
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
 
@@ -37,11 +37,11 @@ def open_room():
     return Daemon(rooms=Room(STEADY, scene=SCENE))
 
 
-class Folder:
+class Given(Folder):
     """Camera frames, lights, poses, and room for what comes of them."""
 
     def __init__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-recording-test.')
+        super().__init__()
         self.write('camera.json', json.dumps(CAMERA_JSON).encode())
         os.mkdir(self.at('shots'))
         for i in range(FRAMES):
@@ -52,20 +52,6 @@ class Folder:
                                                           0, 0, 0, 1]} for i in range(4)]
         self.write('poses.jsonl', '\n'.join(map(json.dumps, poses)).encode())
         self.recording = self.at('session.gnr')
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
-        return self.at(name)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
 
 
 class Run:
@@ -227,7 +213,7 @@ def get_composites(path):
 
 def test_to_the_bit():
     """The same bytes go out but for capture times, and the same composites come back: twice."""
-    with Folder() as folder:
+    with Given() as folder:
         record(folder)
         first = SESSION['composites']
         assert len(first) == FRAMES and len({p[2] for p in first}) == FRAMES
@@ -265,7 +251,7 @@ def test_to_the_bit():
 
 def test_paces():
     """By order alone, stretched, and drawn together: the composites stay the same."""
-    with Folder() as folder:
+    with Given() as folder:
         record(folder)
         length = get_frame_span(folder.recording)
         assert length > .5, length
@@ -299,7 +285,7 @@ def test_paces():
 
 def test_other_light():
     """What is not as recorded is said, with what differs."""
-    with Folder() as folder:
+    with Given() as folder:
         record(folder)
         with Daemon(STEADY + 'light-method = median-cut\nlights = 2\n') as daemon:
             out = replay(daemon, folder, '--expect-equal', '--as-fast-as-possible').fail(
@@ -313,7 +299,7 @@ def test_other_light():
 
 def test_three_in_one_file():
     """Probe, viewer and tracker of one room write one file; the object moves again in the replay."""
-    with Folder() as folder:
+    with Given() as folder:
         with open_room() as daemon:
             lamp, viewer = begin(daemon, folder)
             hand = Run('track', server(daemon), '--object', 'cube', '--poses',
@@ -339,7 +325,7 @@ def test_three_in_one_file():
 
 def test_killed_writer():
     """A viewer that is killed harms neither the probe's recording nor what it had written itself."""
-    with Folder() as folder:
+    with Given() as folder:
         with open_room() as daemon:
             lamp, viewer = begin(daemon, folder, '--loop', rate='20')
             viewer.wait_for('frame 12:')
@@ -360,7 +346,7 @@ def test_killed_writer():
 
 def test_no_room():
     """A recording that may not grow ends with a sentence; the session does not notice."""
-    with Folder() as folder, open_room() as daemon:
+    with Given() as folder, open_room() as daemon:
         lamp, viewer = begin(daemon, folder, '--record-max', '60KiB')
         status, out, err = viewer.end()
         assert status == 0 and ' %d results' % FRAMES in out, (out, err)
@@ -382,7 +368,7 @@ def test_no_room():
 
 
 def test_hostile_files():
-    with Folder() as folder, open_room() as daemon:
+    with Given() as folder, open_room() as daemon:
         record(folder)
         data = open(folder.recording, 'rb').read()
         cases = (('nothing', b'', 'too short'), ('text', b'a text\n' * 40, 'no recording'),
@@ -415,7 +401,7 @@ def test_hostile_files():
 
 
 def test_usage():
-    with Folder() as folder, open_room() as daemon:
+    with Given() as folder, open_room() as daemon:
         folder.write('other', b'something of mine that must stay')
         Run('probe', server(daemon), '--files', folder.at('light0.exr'), '--record',
             folder.at('other')).fail(1, 'will not be overwritten')

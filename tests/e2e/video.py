@@ -7,13 +7,12 @@ usage: video.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON yes|no (built with libav)
 import json
 import os
 import random
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, read_png  # noqa: E402
 
@@ -35,26 +34,12 @@ def y4m(rate):
     return data
 
 
-class Folder:
+class Given(Folder):
     def __init__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-video-test.')
+        super().__init__()
         self.write('camera.json', json.dumps(CAMERA_JSON).encode())
         self.write('light.exr', exr_bytes(32, 16, (1, 1, 1)))
         self.write('v.y4m', y4m(5))
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
-        return self.at(name)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
 
 
 def run(*arguments):
@@ -90,7 +75,7 @@ def light(folder, daemon):
 
 def test_view():
     """Every picture with its colour, at the file's times."""
-    with Folder() as folder, Daemon() as daemon:
+    with Given() as folder, Daemon() as daemon:
         light(folder, daemon)
         start = time.monotonic()
         succeed(*view(folder, daemon))
@@ -105,7 +90,7 @@ def test_view():
 
 
 def test_pace():
-    with Folder() as folder, Daemon() as daemon:
+    with Given() as folder, Daemon() as daemon:
         light(folder, daemon)
         start = time.monotonic()
         succeed(*view(folder, daemon, '--rate', '2'))
@@ -116,7 +101,7 @@ def test_pace():
 
 
 def test_probe_and_screen():
-    with Folder() as folder, Daemon() as daemon:
+    with Given() as folder, Daemon() as daemon:
         video = folder.at('v.y4m')
         setup = folder.write('setup.json', json.dumps(
             {'projection': 'latlong', 'response': {'type': 'srgb'}}).encode())
@@ -131,7 +116,7 @@ def test_probe_and_screen():
 
 
 def test_refusals():
-    with Folder() as folder, Daemon() as daemon:
+    with Given() as folder, Daemon() as daemon:
         noise = folder.write('noise.mp4', random.Random(1).randbytes(20000))
         fail(1, *view(folder, daemon, name='noise.mp4'), words='noise.mp4: no video file')
         fail(1, *view(folder, daemon, name='light.exr'), words='light.exr: no video file')
@@ -147,7 +132,7 @@ def test_refusals():
 
 
 def test_absent():
-    with Folder() as folder, Daemon() as daemon:
+    with Given() as folder, Daemon() as daemon:
         fail(1, *view(folder, daemon), words='libavformat-dev')
 
 

@@ -13,26 +13,12 @@
 #include <string.h>
 
 #include "proto/attr.h"
+#include "tests/random.h"
 #include "tests/unit/cmocka_setup.h"
 
 #define PATCH_PX 14
 
-/* xorshift64*; normal deviates by the sum of twelve. */
-static uint64_t state_of_random = 88172645463325252u;
-static double draw(void)
-{
-    state_of_random ^= state_of_random >> 12;
-    state_of_random ^= state_of_random << 25;
-    state_of_random ^= state_of_random >> 27;
-    return (double)((state_of_random * 2685821657736338717u) >> 11) / 9007199254740992.0;
-}
-static double draw_normal(void)
-{
-    double sum = -6;
-    for (int i = 0; i < 12; i++)
-        sum += draw();
-    return sum;
-}
+static uint64_t random_state = 1;
 
 /* Linear Rec.709 to the sensor's linear RGB: what the fitted matrix must undo. */
 static const double device_from_rec709[9] = {0.8, 0.25, 0.05, 0.15, 0.9, 0.1, 0.03, 0.22, 0.6};
@@ -48,7 +34,7 @@ struct sensor {
 static double expose(const struct sensor *s, double light)
 {
     double y = s->is_linear ? s->a + s->b * light : s->a + s->b * log(s->c + light);
-    double code = floor(y * s->full + s->noise * draw_normal() + 0.5);
+    double code = floor(y * s->full + s->noise * gn_test_random_normal(&random_state) + 0.5);
     return fmin(fmax(code, 0), s->full) / s->full;
 }
 
@@ -311,7 +297,7 @@ static void test_orientation(void **unused)
     assert_memory_equal(&turned, &place, sizeof(place));
     assert_int_equal(gn_image_init(&grey, image.width, image.height, 1), 0);
     for (int i = 0; i < grey.width * grey.height; i++)
-        grey.data[i] = (float)draw();
+        grey.data[i] = (float)gn_test_random_unit(&random_state);
     assert_true(gn_chart_orient(&grey, &turned) < 0.8); // noise is no chart
     struct gn_chart_patch patches[24];
     struct gn_error e = {0};

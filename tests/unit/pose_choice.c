@@ -9,27 +9,13 @@
 #include "client/track/pose_fit.h"
 #include "client/track/rotation.h"
 #include "client/vision/markers.h"
+#include "tests/random.h"
 #include "tests/unit/cmocka_setup.h"
 
 static const double pi = 3.14159265358979323846;
 static const double square[4][3] = {
     {-0.02, 0.02, 0}, {0.02, 0.02, 0}, {0.02, -0.02, 0}, {-0.02, -0.02, 0}};
-static uint64_t seed = 99;
-
-/* Uniform in [0, 1). Source: Steele, Lea, Flood 2014 (SplitMix64). */
-static double draw(void)
-{
-    uint64_t z = seed += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    z ^= z >> 31;
-    return (double)(z >> 11) * 0x1p-53;
-}
-
-static double draw_normal(void)
-{
-    return sqrt(-2 * log(1 - draw())) * cos(2 * pi * draw());
-}
+static uint64_t random_state = 99;
 
 static struct gn_camera get_camera(void)
 {
@@ -58,8 +44,8 @@ static void see(const struct gn_camera *camera, const struct gn_pose *pose,
         double p[3];
         gn_pose_transform(pose, points[i], p);
         assert_true(gn_camera_project(camera, p, out[i]));
-        out[i][0] += noise_px * draw_normal();
-        out[i][1] += noise_px * draw_normal();
+        out[i][0] += noise_px * gn_test_random_normal(&random_state);
+        out[i][1] += noise_px * gn_test_random_normal(&random_state);
     }
 }
 
@@ -80,7 +66,9 @@ static void fits_exact_points_exactly(void **state)
     static const double corner[8][3] = {{0, 0, 0},   {.1, 0, 0},  {0, .1, 0},  {0, 0, .1},
                                         {.1, .1, 0}, {0, .1, .1}, {.1, 0, .1}, {.1, .1, .1}};
     for (int i = 0; i < 200; i++) {
-        struct gn_pose pose = get_pose(0.1 + 1.1 * draw(), 2 * pi * draw(), 0.3 + draw());
+        struct gn_pose pose = get_pose(0.1 + 1.1 * gn_test_random_unit(&random_state),
+                                       2 * pi * gn_test_random_unit(&random_state),
+                                       0.3 + gn_test_random_unit(&random_state));
         struct gn_pose_fit fits[2];
         double seen[8][2];
         see(&camera, &pose, square, 4, 0, seen);
@@ -118,7 +106,9 @@ static void no_pose_near_the_answer_fits_better(void **state)
         return;
     struct gn_camera camera = get_camera();
     for (int i = 0; i < 100; i++) {
-        struct gn_pose pose = get_pose(0.3 + 0.6 * draw(), 2 * pi * draw(), 0.3 + 0.2 * draw());
+        struct gn_pose pose = get_pose(0.3 + 0.6 * gn_test_random_unit(&random_state),
+                                       2 * pi * gn_test_random_unit(&random_state),
+                                       0.3 + 0.2 * gn_test_random_unit(&random_state));
         struct gn_pose_fit fits[2];
         double seen[4][2];
         see(&camera, &pose, square, 4, 0.3, seen);
@@ -213,7 +203,7 @@ static void flips_are_rejected(void **state)
     if (!gn_vision_is_built())
         return;
     int n_better = 0;
-    seed = 99;
+    random_state = 99;
     int n_flips = count_flips(true, 900, 0.25, &n_better);
     print_message("# of 900 pictures %d fit the flip better, %d answers are it\n", n_better,
                   n_flips);

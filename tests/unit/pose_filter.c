@@ -8,25 +8,11 @@
 
 #include "client/track/pose_filter.h"
 #include "client/track/rotation.h"
+#include "tests/random.h"
 #include "tests/unit/cmocka_setup.h"
 
 static const double pi = 3.14159265358979323846;
-static uint64_t seed = 17;
-
-/* Uniform in [0, 1). Source: Steele, Lea, Flood 2014 (SplitMix64). */
-static double draw(void)
-{
-    uint64_t z = seed += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    z ^= z >> 31;
-    return (double)(z >> 11) * 0x1p-53;
-}
-
-static double draw_normal(void)
-{
-    return sqrt(-2 * log(1 - draw())) * cos(2 * pi * draw());
-}
+static uint64_t random_state = 17;
 
 static struct gn_pose_filter fresh(void)
 {
@@ -67,7 +53,7 @@ static void run(struct gn_pose (*path)(double), double rate_hz, struct gn_pose o
     for (int k = 0; k < 20; k++) {
         double end_s = (k + 1) * 2.0 / 15;
         while (time_s < end_s - 1e-9) {
-            time_s += rate_hz > 0 ? 1 / rate_hz : 0.001 + 0.06 * draw();
+            time_s += rate_hz > 0 ? 1 / rate_hz : 0.001 + 0.06 * gn_test_random_unit(&random_state);
             if (time_s > end_s - 1e-4)
                 time_s = end_s;
             pose = path(time_s);
@@ -197,7 +183,7 @@ static double measure_lag_s(double rate_hz, double noise_m)
     for (int i = 0; i < n; i++) {
         struct gn_pose pose = hand(i / rate_hz);
         for (int k = 0; k < 3; k++)
-            pose.translation[k] += noise_m * draw_normal();
+            pose.translation[k] += noise_m * gn_test_random_normal(&random_state);
         update(&f, i / rate_hz, &pose);
         answers[i] = f.pose.translation[0];
     }
@@ -227,8 +213,8 @@ static void lag_and_jitter_are_what_the_issue_allows(void **state)
         struct gn_pose pose = {.translation = {0, 0, 0.5}};
         double vector[3];
         for (int k = 0; k < 3; k++) {
-            pose.translation[k] += noise_m * draw_normal();
-            vector[k] = noise_rad * draw_normal();
+            pose.translation[k] += noise_m * gn_test_random_normal(&random_state);
+            vector[k] = noise_rad * gn_test_random_normal(&random_state);
         }
         gn_rotation_exp(vector, pose.rotation);
         update(&f, i / 60.0, &pose);
@@ -256,9 +242,9 @@ static void rotation_vectors_and_quaternions_agree(void **state)
     (void)state;
     for (int i = 0; i < 1000; i++) {
         double vector[3], q[4], back[3], norm = 0;
-        double scale = pow(10, -12 * draw());
+        double scale = pow(10, -12 * gn_test_random_unit(&random_state));
         for (int k = 0; k < 3; k++) {
-            vector[k] = 1.8 * scale * (2 * draw() - 1);
+            vector[k] = 1.8 * scale * (2 * gn_test_random_unit(&random_state) - 1);
             norm += vector[k] * vector[k];
         }
         gn_rotation_exp(vector, q);

@@ -14,6 +14,7 @@
 
 #include "common/image_file.h"
 #include "proto/attr.h"
+#include "tests/random.h"
 #include "tests/real_data.h"
 #include "tests/unit/cmocka_setup.h"
 
@@ -24,21 +25,7 @@
 #define HEIGHT 128
 #define PICTURES 13
 
-static uint64_t state_of_random = 88172645463325252u;
-static double draw(void)
-{
-    state_of_random ^= state_of_random >> 12;
-    state_of_random ^= state_of_random << 25;
-    state_of_random ^= state_of_random >> 27;
-    return (double)((state_of_random * 2685821657736338717u) >> 11) / 9007199254740992.0;
-}
-static double draw_normal(void)
-{
-    double sum = -6;
-    for (int i = 0; i < 12; i++)
-        sum += draw();
-    return sum;
-}
+static uint64_t random_state = 1;
 
 /* Three cameras: sRGB, gamma 2.2, and one with a shoulder as film has. */
 enum { SRGB, GAMMA, FILM, CURVES };
@@ -83,9 +70,13 @@ static void expose(const struct gn_image *map, int curve, double noise,
         times[k] = 0.004 * pow(2, k);
         assert_int_equal(gn_image8_init(&pictures[k], map->width, map->height, 3), 0);
         for (int i = 0; i < map->width * map->height * 3; i++) {
-            double x = (double)map->data[i] * times[k] * (1 + noise * draw_normal());
-            pictures[k].data[i] = (uint8_t)fmin(
-                fmax(floor(255 * encode(curve, x) + 50 * noise * draw_normal() + 0.5), 0), 255);
+            double x = (double)map->data[i] * times[k] *
+                       (1 + noise * gn_test_random_normal(&random_state));
+            pictures[k].data[i] =
+                (uint8_t)fmin(fmax(floor(255 * encode(curve, x) +
+                                         50 * noise * gn_test_random_normal(&random_state) + 0.5),
+                                   0),
+                              255);
         }
     }
 }
