@@ -5,6 +5,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -178,4 +179,14 @@ int gn_calibrate_read_numbers(const char *option, const char *text, int n, int c
         return gn_error_set(out_error, -EINVAL, "--%s: %d numbers for %d pictures", option, count,
                             n);
     return count;
+}
+
+int gn_calibrate_parse_board(const char *text, struct gn_board *board, struct gn_error *out_error)
+{
+    char rest;
+    if (sscanf(text, "%3dx%3d%c", &board->columns, &board->rows, &rest) != 2)
+        return gn_error_set(out_error, -EINVAL,
+                            "--board %s: right would be squares as COLUMNSxROWS, for example 10x7",
+                            text);
+    return 0;
 }

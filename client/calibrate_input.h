@@ -8,12 +8,14 @@
 #define GN_CLIENT_CALIBRATE_INPUT_H
 
 #include "client/capture/file.h"
+#include "client/vision/boards.h"
 #include "common/error.h"
 #include "common/image.h"
 #include "common/image_file.h"
 #include "proto/attr.h"
 
 /** argv[0] is the command's name. Each returns the process's exit status. */
+int gn_cmd_calibrate_print(int argc, char *const argv[]);
 int gn_cmd_calibrate_intrinsics(int argc, char *const argv[]);
 int gn_cmd_calibrate_response(int argc, char *const argv[]);
 int gn_cmd_calibrate_probe(int argc, char *const argv[]);
@@ -48,6 +50,10 @@ GN_MUST_USE int gn_calibrate_stretch(const struct gn_image *image, struct gn_ima
 /** The same in gray. */
 GN_MUST_USE int gn_calibrate_stretch_gray(const struct gn_image *image,
                                           struct gn_image8 *out_image);
+
+/** Sets columns and rows from "10x7", text of --board. Returns 0, or -EINVAL and a sentence. */
+GN_MUST_USE int gn_calibrate_parse_board(const char *text, struct gn_board *board,
+                                         struct gn_error *out_error);
 
 /**
  * Numbers separated by commas or white space, fractions as 1/60; text is the list itself or the

@@ -16,6 +16,8 @@ static const struct {
     int (*run)(int argc, char *const argv[]);
     const char *summary;
 } commands[] = {
+    {"print", gn_cmd_calibrate_print,
+     "the board or marker that is looked for, to be printed (SVG)"},
     {"intrinsics", gn_cmd_calibrate_intrinsics,
      "the lens of a camera, from pictures of a chessboard or ChArUco board"},
     {"response", gn_cmd_calibrate_response,

@@ -122,12 +122,10 @@ struct run {
 static int read_board(const struct gn_options *options, struct gn_board *out,
                       struct gn_error *out_error)
 {
-    const char *text = gn_options_get_string(options, NULL, NULL, "board");
-    char rest;
-    if (sscanf(text, "%3dx%3d%c", &out->columns, &out->rows, &rest) != 2)
-        return gn_error_set(out_error, -EINVAL,
-                            "--board %s: right would be squares as COLUMNSxROWS, for example 10x7",
-                            text);
+    int err = gn_calibrate_parse_board(gn_options_get_string(options, NULL, NULL, "board"), out,
+                                       out_error);
+    if (err)
+        return err;
     out->square_m = gn_options_get_double(options, NULL, NULL, "square");
     out->is_charuco = gn_options_is_set(options, NULL, NULL, "charuco");
     out->dictionary = gn_options_get_enum(options, NULL, NULL, "charuco");

@@ -27,6 +27,7 @@ OPTIONS = [
     ([GNOMON, 'replay'], CONNECT | {'info', 'streams', 'rate-factor', 'as-fast-as-possible',
                                     'open-loop', 'pin-light', 'loop', 'out', 'expect-equal'}),
     ([GNOMON, 'doctor'], SERVER),
+    ([GNOMON, 'calibrate', 'print'], {'board', 'square', 'charuco', 'marker', 'markers', 'body', 'out'}),
     ([GNOMON, 'calibrate', 'intrinsics'], LIVE | {'files', 'video', 'board', 'square', 'charuco', 'marker',
                                                   'square-pixels', 'max-error', 'out', 'picture',
                                                   'views', 'keep'}),
