@@ -9,11 +9,14 @@
 #include <jansson.h>
 #include <openexr.h>
 #include <png.h>
+#include <unistd.h>
 
 #include "client/capture/gige.h"
 #include "client/capture/v4l2.h"
 #include "client/cmd.h"
 #include "client/feature.h"
+#include "client/view/window.h"
+#include "client/vision/markers.h"
 #include "common/thread.h"
 #include "proto/attr.h"
 
@@ -79,44 +82,98 @@ static void check_libraries(void)
     snprintf(text, sizeof(text), "OpenEXR %d.%d.%d, libpng %s, libjpeg-turbo, jansson %s", major,
              minor, patch, png_get_libpng_ver(NULL), jansson_version_str());
     say("ok", "libraries", text);
+    say("ok", "files", "EXR, Radiance, PNG, JPEG; sequences of the capture rig");
 }
 
-/** Every optional feature: built in, or what is missing. */
-static void check_features(void)
+/** A row of the table of optional parts; name NULL: another line of the one above. */
+static void say_part(const char *mark, const char *name, const char *text)
 {
-    for (int id = 0; id < GN_FEATURE_COUNT; id++) {
-        const struct gn_feature *f = gn_feature_get((enum gn_feature_id)id);
-        struct gn_error error = {0};
-        if (!f->is_built)
-            gn_feature_refuse((enum gn_feature_id)id, &error);
-        say(f->is_built ? "ok" : "no", f->name, f->is_built ? f->gives : error.text);
-    }
+    printf("%-6s %-10s %-9s %s\n", mark, name ? name : "",
+           name ? strcmp(mark, "absent") == 0 ? "no" : "yes" : "", text);
 }
+
+/** What finding cameras has come to. */
+struct part {
+    const char *name;
+    int n; // cameras
+};
 
 static void say_gige(void *context, const char *id, const char *model, const char *address)
 {
-    (void)context;
+    struct part *part = context;
     char text[512];
     snprintf(text, sizeof(text), "%s: %s, at %s", id, model, address);
-    say("ok", "GigE", text);
+    say_part("ok", part->n++ ? NULL : part->name, text);
+}
+
+static void find_gige(const char *name)
+{
+    if (gn_gige_find(say_gige, &(struct part){.name = name}) == 0)
+        say_part("none", name,
+                 "no GigE Vision camera answers in the networks of this machine; one behind a "
+                 "router is opened by its address");
 }
 
 static void say_v4l2(void *context, int indent, const char *line)
 {
-    (void)context;
+    struct part *part = context;
     if (indent)
-        printf("%-17s   %s\n", "", line);
+        printf("%-27s   %s\n", "", line);
     else
-        say("ok", "V4L2", line);
+        say_part("ok", part->n++ ? NULL : part->name, line);
 }
 
-static void check_cameras(void)
+/** A camera that only others may open is the commonest reason to see none. */
+static void find_v4l2(const char *name)
 {
-    if (gn_v4l2_describe_all(say_v4l2, NULL) == 0)
-        say("no", "V4L2", "no /dev/video* of this machine captures video");
-    if (gn_gige_find(say_gige, NULL) == 0)
-        say("no", "GigE", "no GigE Vision camera answers in the networks of this machine");
-    say("ok", "files", "EXR, Radiance, PNG, JPEG; sequences of the capture rig");
+    char path[32], text[128];
+    if (gn_v4l2_describe_all(say_v4l2, &(struct part){.name = name}) > 0)
+        return;
+    for (int i = 0; i < 64; i++) {
+        snprintf(path, sizeof(path), "/dev/video%d", i);
+        if (access(path, F_OK) == 0 && access(path, R_OK | W_OK) != 0) {
+            snprintf(text, sizeof(text),
+                     "%s is not yours to open; right would be to be in its group: ls -l %s", path,
+                     path);
+            say_part("none", name, text);
+            return;
+        }
+    }
+    say_part("none", name, "no /dev/video* of this machine captures video");
+}
+
+static void find_display(const char *name)
+{
+    struct gn_error error = {0};
+    if (gn_window_find_display(&error) < 0)
+        say_part("none", name, error.text);
+    else
+        say_part("ok", name, "there is a display");
+}
+
+/** Every optional part: built in, and what of it is on this machine; or how to come by it. */
+static void check_parts(void)
+{
+    printf("\n%-6s %-10s %-9s %s\n", "", "optional", "built in", "on this machine");
+    for (int id = 0; id < GN_FEATURE_COUNT; id++) {
+        const struct gn_feature *f = gn_feature_get((enum gn_feature_id)id);
+        struct gn_error error = {0};
+        if (!f->is_built) {
+            gn_feature_refuse((enum gn_feature_id)id, &error);
+            say_part("absent", f->name, error.text);
+        } else if (id == GN_FEATURE_GIGE) {
+            find_gige(f->name);
+        } else if (id == GN_FEATURE_V4L2) {
+            find_v4l2(f->name);
+        } else if (id == GN_FEATURE_WINDOW) {
+            find_display(f->name);
+        } else {
+            char text[128];
+            snprintf(text, sizeof(text), "%s%s%s", f->gives, id == GN_FEATURE_VISION ? ", by " : "",
+                     id == GN_FEATURE_VISION ? gn_vision_get_version() : "");
+            say_part("ok", f->name, text);
+        }
+    }
 }
 
 int gn_cmd_doctor(int argc, char *const argv[])
@@ -132,8 +189,7 @@ int gn_cmd_doctor(int argc, char *const argv[])
     say("ok", "client", text);
     bool is_ok = check_server(options);
     check_libraries();
-    check_features();
-    check_cameras();
+    check_parts();
     gn_options_destroy(&options);
     return is_ok ? 0 : 1;
 }

@@ -5,19 +5,9 @@
  */
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "client/capture/sequence.h"
 #include "client/viewer.h"
-#include "common/clock.h"
-#include "common/text.h"
 #include "proto/attr.h"
-
-/** How long a frame may wait for light, ms. */
-#define LIGHT_WAIT_MS 5000
-/** Where the composites go for which there is no window. */
-#define DEFAULT_DIR "composites"
 
 static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
@@ -43,8 +33,8 @@ static const struct gn_option option_table[] = {
      .default_value = "false",
      .help = "Show the composites live; h lists the keys: figures, light, objects and shadows on "
              "and off, pictures kept, a recording. Without --out files begin again at the end, "
-             "until q. A server that is lost is waited for. Where there is no display "
-             "the composites go to --out, or to " DEFAULT_DIR ", and that is said."},
+             "until q. A server that is not there is waited for. Where there is no display "
+             "the composites go to --out, or to " GN_VIEWER_DEFAULT_DIR ", and that is said."},
     {.key = "show",
      .flag = "show",
      .type = GN_OPTION_SET,
@@ -122,9 +112,6 @@ static const struct gn_program program = {
     .n_options = GN_ARRAY_LEN(option_table),
 };
 
-/** Where the camera is said to be where nobody knows: it looks up and sees nothing of any scene. */
-static const struct gn_pose nowhere = {{1, 0, 0, 0}, {0, 0, 1e5}};
-
 /** What is wrong with the options together; NULL: nothing. */
 static const char *find_misuse(const struct gn_options *options)
 {
@@ -150,91 +137,6 @@ static const char *find_misuse(const struct gn_options *options)
     return NULL;
 }
 
-/** What light the frame waits for: that of its number, or, before the first result, any. */
-static void set_light_wanted(struct gn_viewer *v, struct gn_msg_frame *frame)
-{
-    int64_t now_ns = gn_client_now_ns();
-    if (v->feed.n_sent == 0)
-        v->first_sent_ns = now_ns;
-    int64_t left_ms = LIGHT_WAIT_MS - (now_ns - v->first_sent_ns) / GN_NS_PER_MS;
-    if (v->sync_light) {
-        frame->lighting_min_sequence = v->sync_light + (uint64_t)v->feed.n_sent;
-        frame->lighting_wait_ms = LIGHT_WAIT_MS;
-    } else if (v->n_results == 0 && left_ms > 0) {
-        frame->lighting_wait_ms = (uint32_t)left_ms;
-    }
-}
-
-/**
- * Says where the camera was when it took the picture: by the markers in it, by the source, or where
- * camera.json has it at rest. Without the world's markers the frame goes all the same, and comes
- * back as it is.
- */
-static int place_frame(struct gn_viewer *v, const struct gn_capture *capture,
-                       struct gn_msg_frame *frame, struct gn_error *out_error)
-{
-    struct gn_pose pose =
-        capture->has_pose ? capture->world_from_camera : v->camera.world_from_camera;
-    int n_seen = v->poses ? gn_poses_take(v->poses, capture, out_error) : 0;
-    if (n_seen < 0)
-        return n_seen;
-    if (v->show)
-        gn_show_set_wishes(v->show, frame);
-    if (v->poses && !gn_poses_get_camera(v->poses, &pose)) {
-        pose = nowhere;
-        frame->no_virtual = frame->no_shadow = true;
-        v->n_unplaced++;
-    }
-    if (v->show)
-        gn_show_put_pose(v->show, &pose);
-    gn_cmd_make_transform(&pose, &frame->views[0].world_from_camera);
-    return 0;
-}
-
-static int send_frame(struct gn_feed *r, const struct gn_capture *capture,
-                      struct gn_error *out_error)
-{
-    struct gn_viewer *v = (struct gn_viewer *)r;
-    int err = gn_viewer_serve(v, gn_feed_get_due_ns(r, capture), v->max_outstanding - 1, out_error);
-    if (err)
-        return err;
-    bool is_jpeg = capture->format == GN_CAPTURE_JPEG;
-    if (!is_jpeg && capture->format != GN_CAPTURE_RGB8)
-        return gn_error_set(out_error, -EINVAL,
-                            "%s is no 8-bit picture; camera frames are 8-bit PNG or JPEG",
-                            capture->name);
-    if (capture->width != v->camera.width || capture->height != v->camera.height)
-        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
-                            capture->name, capture->width, capture->height, v->camera.width,
-                            v->camera.height);
-    struct gn_viewer_pending *p = gn_viewer_get_free(v);
-    struct gn_msg_frame frame = v->frame;
-    frame.id = (uint64_t)r->n_sent + 1;
-    frame.capture_time_ns = gn_feed_get_capture_ns(r, capture);
-    frame.views_count = 1;
-    frame.views[0] = (struct gn_msg_frame_view){
-        .has_world_from_camera = true,
-        .picture_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8,
-        .payload_length = (uint32_t)capture->data_bytes,
-    };
-    err = place_frame(v, capture, &frame, out_error);
-    if (err)
-        return err;
-    set_light_wanted(v, &frame);
-    *p = (struct gn_viewer_pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
-    snprintf(p->name, sizeof(p->name), "%s", capture->name);
-    err = gn_client_send_frame(r->client, &frame, capture->data, capture->data_bytes);
-    if (err) {
-        bool is_ours = err == -EDOM || err == -EMSGSIZE;
-        gn_cmd_set_fault(r->client, err, out_error);
-        if (is_ours || !v->show)
-            return err;
-    }
-    r->n_sent++;
-    v->n_outstanding++;
-    return err ? gn_viewer_reconnect(v, err, out_error) : 0;
-}
-
 /** So that the picture that is read then is the newest when it is sent. */
 static int wait_for_room(struct gn_feed *r, struct gn_error *out_error)
 {
@@ -247,124 +149,17 @@ static int wait_for_answers(struct gn_feed *r, struct gn_error *out_error)
     return gn_viewer_serve((struct gn_viewer *)r, 0, 0, out_error);
 }
 
-static void set_frame_options(struct gn_viewer *v, const struct gn_options *options)
+static int connect_to(struct gn_feed *r, struct gn_error *out_error)
 {
-    bool is_jpeg = gn_options_get_enum(options, NULL, NULL, "result") == 1;
-    v->frame.result_format = is_jpeg ? GN_MSG_PICTURE_FORMAT_JPEG : GN_MSG_PICTURE_FORMAT_RGB8;
-    v->frame.jpeg_quality =
-        is_jpeg ? (uint32_t)gn_options_get_int(options, NULL, NULL, "jpeg-quality") : 0;
-    v->frame.budget_ms = (float)gn_options_get_double(options, NULL, NULL, "budget-ms");
-    static const enum gn_msg_quality qualities[] = {GN_MSG_QUALITY_INTERACTIVE, GN_MSG_QUALITY_SEED,
-                                                    GN_MSG_QUALITY_REFERENCE};
-    v->frame.quality = qualities[gn_options_get_enum(options, NULL, NULL, "quality")];
-    v->max_outstanding = gn_options_get_int(options, NULL, NULL, "outstanding");
-    if (gn_options_is_set(options, NULL, NULL, "sync-light"))
-        v->sync_light = (uint64_t)gn_options_get_int(options, NULL, NULL, "sync-light");
-    unsigned shown = gn_options_get_set(options, NULL, NULL, "show");
-    v->frame.no_virtual = !(shown & 1);
-    v->frame.no_shadow = !(shown & 2);
-}
-
-/** Where there is no display, files take the window's place. */
-static int open_window(struct gn_viewer *v, const struct gn_options *options,
-                       struct gn_error *out_error)
-{
-    if (!gn_options_get_bool(options, NULL, NULL, "window"))
-        return 0;
-    const struct gn_show_options show_options = {.width = v->camera.width,
-                                                 .height = v->camera.height,
-                                                 .dir = v->dir,
-                                                 .no_virtual = v->frame.no_virtual,
-                                                 .no_shadow = v->frame.no_shadow};
-    int err = gn_show_open(&show_options, &v->show, out_error);
-    v->feed.link.wants_light = !err;
-    if (err != -ENODEV)
-        return err;
-    v->dir = v->dir ? v->dir : DEFAULT_DIR;
-    fprintf(stderr, "%s: %s; the composites go to %s instead\n", program.name, out_error->text,
-            v->dir);
-    *out_error = (struct gn_error){0};
-    return 0;
-}
-
-static int open_poses(struct gn_viewer *v, const struct gn_options *options,
-                      struct gn_error *out_error)
-{
-    int err = gn_poses_open(options, &v->camera, false, &v->poses, out_error);
-    if (!err && gn_poses_find_body(v->poses, GN_BODY_WORLD) < 0)
-        err = gn_error_set(out_error, -EINVAL,
-                           "%s: there is no body called \"" GN_BODY_WORLD
-                           "\", whose markers say where the world is",
-                           gn_options_get_string(options, NULL, NULL, "markers"));
-    return err;
-}
-
-static int open_source(struct gn_feed *r, const struct gn_options *options,
-                       struct gn_error *out_error)
-{
-    struct gn_viewer *v = (struct gn_viewer *)r;
-    const char *dir = gn_options_get_string(options, NULL, NULL, "sequence");
-    const char *pattern = gn_options_get_string(options, NULL, NULL, "files");
-    const char *camera_path = gn_options_get_string(options, NULL, NULL, "camera");
-    struct gn_sequence sequence = {0};
-    struct gn_file_list list = {0};
-    bool is_live = gn_live_count_asked(options) > 0, has_place = true;
-    int err;
-    if (dir) {
-        err = gn_sequence_read(dir, &sequence, out_error);
-        v->camera = sequence.camera;
-        list = sequence.pictures;
-        memset(&sequence.pictures, 0, sizeof(sequence.pictures));
-    } else {
-        err = gn_poses_is_asked(options)
-                  ? gn_poses_read_camera(camera_path, &v->camera, &has_place, out_error)
-                  : gn_camera_read_file(camera_path, &v->camera, out_error);
-        if (!err && v->camera.response.type == GN_RESPONSE_TABLE)
-            err = gn_error_set(out_error, -EINVAL,
-                               "%s: camera frames travel with no table as response; right would "
-                               "be a formula, as gnomon calibrate response --as gamma finds it",
-                               camera_path);
-        if (!err && pattern)
-            err = gn_file_list_find(pattern, r->rate_hz, &list, out_error);
-    }
-    gn_match_keep(gn_options_get_set(options, NULL, NULL, "match"), &v->camera);
-    gn_sequence_finish(&sequence);
-    v->dir = gn_options_get_string(options, NULL, NULL, "out");
-    set_frame_options(v, options);
-    if (!err && gn_poses_is_asked(options))
-        err = open_poses(v, options, out_error);
-    if (!err)
-        err = open_window(v, options, out_error);
-    // What is only looked at goes on until somebody has seen enough.
-    bool is_loop_said = strcmp(gn_options_get_source(options, NULL, NULL, "loop"), "default") != 0;
-    if (v->show && !v->dir && !is_loop_said)
-        r->is_looped = true;
-    const struct gn_file_source_options source_options = {.is_looped = r->is_looped};
-    const struct gn_live_options wanted = {
-        .is_8_bit = true, .width = v->camera.width, .height = v->camera.height};
-    if (!err && is_live)
-        return gn_live_open(options, &wanted, &r->source, out_error);
-    if (!err && gn_options_is_set(options, NULL, NULL, "video"))
-        return gn_feed_open_video(r, options, false, out_error);
-    if (!err)
-        err = gn_file_list_check_names(&list, out_error);
-    if (!err)
-        err = gn_feed_open_files(r, &list, &source_options, out_error);
-    gn_file_list_finish(&list);
-    return err;
+    return gn_viewer_connect((struct gn_viewer *)r, out_error);
 }
 
 static int begin(struct gn_feed *r, struct gn_error *out_error)
 {
     struct gn_viewer *v = (struct gn_viewer *)r;
     int err = gn_viewer_send_camera(v, out_error);
-    if (!err && v->show) {
-        char title[256];
-        snprintf(title, sizeof(title), "gnomon: room %s - h lists the keys",
-                 gn_client_get_welcome(r->client)->room);
-        gn_text_clean(title);
-        gn_show_set_title(v->show, title);
-    }
+    if (v->show)
+        gn_show_set_room(v->show, gn_client_get_welcome(r->client)->room);
     if (!err && v->dir)
         err = gn_record_open(v->dir, &v->record, out_error);
     return err || !v->dir || !v->poses ? err : gn_poses_write_to(v->poses, v->dir, out_error);
@@ -411,10 +206,11 @@ int gn_cmd_view(int argc, char *const argv[])
         .role = GN_MSG_ROLE_VIEWER,
         .takes_sequences = true,
         .find_misuse = find_misuse,
-        .open = open_source,
+        .open = gn_viewer_open,
+        .connect = connect_to,
         .begin = begin,
         .serve = wait_for_room,
-        .send = send_frame,
+        .send = gn_viewer_send,
         .end = wait_for_answers,
         .report = report,
     };

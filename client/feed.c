@@ -222,7 +222,8 @@ int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int ar
         gn_cmd_fail(command->program, misuse);
         status = 2;
     } else if (command->open(r, options, &error) < 0 ||
-               gn_cmd_connect_as(&r->link, &r->client, &error) < 0 ||
+               (command->connect ? command->connect(r, &error)
+                                 : gn_cmd_connect_as(&r->link, &r->client, &error)) < 0 ||
                (command->begin && command->begin(r, &error) < 0)) {
         gn_cmd_fail(command->program, error.text);
     } else {

@@ -95,6 +95,8 @@ struct gn_feed_command {
     const char *(*find_misuse)(const struct gn_options *options);
     /** Opens the source and reads its options, borrowed for the whole run. */
     int (*open)(struct gn_feed *r, const struct gn_options *options, struct gn_error *out_error);
+    /** Connects; NULL: as link says, with one try. */
+    int (*connect)(struct gn_feed *r, struct gn_error *out_error);
     /** The first messages, once connected; NULL: none. */
     int (*begin)(struct gn_feed *r, struct gn_error *out_error);
     /**

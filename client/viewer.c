@@ -6,9 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
-#include "client/redial.h"
 #include "client/view/overlay.h"
 #include "common/clock.h"
 #include "common/text.h"
@@ -21,11 +19,6 @@
 #define SILENCE_NS (2 * GN_NS_PER_S)
 /** It says why frames are dropped after so many in a row. */
 #define DROPPED_MIN 4
-/** From one try to connect to the next; it doubles. */
-#define FIRST_PAUSE_NS (250 * GN_NS_PER_MS)
-#define LAST_PAUSE_NS (2 * GN_NS_PER_S)
-/** Of each step of such a try. */
-#define REDIAL_TIMEOUT_MS 2000
 
 int gn_viewer_send_camera(struct gn_viewer *v, struct gn_error *out_error)
 {
@@ -166,11 +159,10 @@ static void show_trouble(struct gn_viewer *v)
         snprintf(text, sizeof(text), "no answer for %d s", (int)(longest_ns / GN_NS_PER_S));
     else if (v->n_dropped_since >= DROPPED_MIN)
         snprintf(text, sizeof(text), "no picture: %s", v->last_drop);
-    gn_show_set_trouble(v->show, text);
+    gn_show_set_state(v->show, text[0] ? GN_SHOW_TROUBLE : GN_SHOW_LIVE, text);
 }
 
-/** Keeps the window alive. False: it is to be closed. */
-static bool pump(struct gn_viewer *v)
+bool gn_viewer_pump(struct gn_viewer *v)
 {
     struct gn_source_counts source;
     gn_source_get_counts(v->feed.source, &source);
@@ -182,86 +174,6 @@ static bool pump(struct gn_viewer *v)
     gn_show_put_counts(v->show, &counts);
     v->is_closed = !gn_show_pump(v->show);
     return !v->is_closed;
-}
-
-/** Pumps until then, or until the redial is done. 0 or -EINTR. */
-static int pause_until(struct gn_viewer *v, int64_t until_ns, const struct gn_redial *redial)
-{
-    const struct timespec tick = {.tv_nsec = GN_SHOW_TICK_MS * GN_NS_PER_MS};
-    while (redial ? !gn_redial_is_done(redial) : gn_clock_get_monotonic_ns() < until_ns) {
-        if (gn_cmd_is_interrupted() || !pump(v))
-            return -EINTR;
-        nanosleep(&tick, NULL);
-    }
-    return 0;
-}
-
-/** What was out will not come back: each is noted as dropped. */
-static int give_up_pending(struct gn_viewer *v, struct gn_error *out_error)
-{
-    int err = 0;
-    for (int i = 0; i < GN_VIEWER_MAX_OUTSTANDING; i++) {
-        struct gn_viewer_pending *p = &v->pending[i];
-        const struct gn_msg_dropped dropped = {.id = p->id,
-                                               .reason = GN_MSG_DROP_REASON_SESSION_ENDED,
-                                               .sentence = "the server was lost"};
-        if (p->id && v->record && !err)
-            err = gn_record_add_dropped(v->record, p->name, &dropped, out_error);
-        v->n_lost += p->id != 0;
-        p->id = 0;
-    }
-    v->n_outstanding = 0;
-    return err;
-}
-
-/** One try. 0, -EINTR, or why it failed. */
-static int dial(struct gn_viewer *v, struct gn_error *out_error)
-{
-    struct gn_cmd_link link = v->feed.link;
-    struct gn_redial *redial = NULL;
-    link.timeout_ms = REDIAL_TIMEOUT_MS;
-    int err = gn_redial_start(&link, &redial, out_error);
-    if (err)
-        return err;
-    int interrupted = pause_until(v, 0, redial);
-    err = gn_redial_finish(&redial, &v->feed.client, out_error);
-    if (!err && !interrupted)
-        err = gn_viewer_send_camera(v, out_error);
-    if (err)
-        gn_client_destroy(&v->feed.client);
-    return interrupted ? interrupted : err;
-}
-
-int gn_viewer_reconnect(struct gn_viewer *v, int err, struct gn_error *why)
-{
-    int64_t lost_ns = gn_clock_get_monotonic_ns(), pause_ns = FIRST_PAUSE_NS;
-    if (!v->show)
-        return err;
-    gn_cmd_fail(v->feed.program, why->text);
-    gn_client_destroy(&v->feed.client);
-    int failed = give_up_pending(v, why);
-    if (failed)
-        return failed;
-    for (err = -ENOTCONN; err;) {
-        char text[640];
-        snprintf(text, sizeof(text), "server lost, trying again (%s)", why->text);
-        gn_text_clean(text);
-        gn_show_set_trouble(v->show, text);
-        err = pause_until(v, gn_clock_get_monotonic_ns() + pause_ns, NULL);
-        pause_ns = 2 * pause_ns < LAST_PAUSE_NS ? 2 * pause_ns : LAST_PAUSE_NS;
-        if (!err)
-            err = dial(v, why);
-        if (err == -EINTR)
-            return err;
-    }
-    v->n_reconnected++;
-    v->n_dropped_since = 0;
-    v->feed.clock_ns = gn_clock_get_monotonic_ns();
-    gn_show_set_trouble(v->show, NULL);
-    printf("connected again after %.1f s\n", (double)(v->feed.clock_ns - lost_ns) * 1e-9);
-    fflush(stdout);
-    *why = (struct gn_error){0};
-    return 0;
 }
 
 /** One event, or none within the time. Returns whether there was one, or a negative errno and a
@@ -296,7 +208,7 @@ static int take_event(struct gn_viewer *v, int timeout_ms, bool *out_is_lost,
 int gn_viewer_serve(struct gn_viewer *v, int64_t due_ns, int max_left, struct gn_error *out_error)
 {
     for (;;) {
-        if (gn_cmd_is_interrupted() || (v->show && !pump(v)))
+        if (gn_cmd_is_interrupted() || (v->show && !gn_viewer_pump(v)))
             return -EINTR;
         int timeout_ms = gn_feed_get_timeout_ms(due_ns);
         bool is_due = timeout_ms == 0, is_lost;

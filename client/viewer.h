@@ -16,6 +16,9 @@
 /** Most frames on their way at once. */
 #define GN_VIEWER_MAX_OUTSTANDING 16
 
+/** Where the composites go for which there is no window. */
+#define GN_VIEWER_DEFAULT_DIR "composites"
+
 /** A frame that has been sent and not answered. id 0: free. */
 struct gn_viewer_pending {
     uint64_t id;
@@ -47,6 +50,15 @@ struct gn_viewer {
     char last_drop[256]; // why a frame was dropped
 };
 
+/* What feed.h asks of a command; feed is that of a viewer. */
+
+/** Opens source, camera, markers and window as the options say. */
+GN_MUST_USE int gn_viewer_open(struct gn_feed *feed, const struct gn_options *options,
+                               struct gn_error *out_error);
+/** Waits until the picture is due, places it and sends it. */
+GN_MUST_USE int gn_viewer_send(struct gn_feed *feed, const struct gn_capture *capture,
+                               struct gn_error *out_error);
+
 /** Tells the server about the camera. Returns 0, or a negative errno and a sentence. */
 GN_MUST_USE int gn_viewer_send_camera(struct gn_viewer *v, struct gn_error *out_error);
 
@@ -60,6 +72,15 @@ struct gn_viewer_pending *gn_viewer_get_free(struct gn_viewer *v);
  */
 GN_MUST_USE int gn_viewer_serve(struct gn_viewer *v, int64_t due_ns, int max_left,
                                 struct gn_error *out_error);
+
+/** Keeps the window alive. False: it is to be closed. */
+bool gn_viewer_pump(struct gn_viewer *v);
+
+/**
+ * Connects. With a window a server that is not there yet is waited for. Returns 0, -EINTR (Ctrl-C,
+ * or the window was closed) or another negative errno, and a sentence.
+ */
+GN_MUST_USE int gn_viewer_connect(struct gn_viewer *v, struct gn_error *out_error);
 
 /**
  * The server is gone, `why` says how: shows that, and comes back as soon as it is there. Frames

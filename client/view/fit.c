@@ -24,11 +24,19 @@ struct gn_fit gn_fit_picture(int picture_width, int picture_height, int window_w
     return fit;
 }
 
-struct gn_fit gn_fit_window(int picture_width, int picture_height, int max_width, int max_height)
+struct gn_fit gn_fit_window(int picture_width, int picture_height, int max_width, int max_height,
+                            double dpi)
 {
     int across = 640 / picture_width, down = 480 / picture_height;
     int times = across < down ? across : down;
     times = times < 1 ? 1 : times;
+    for (int finer = dpi < 168 ? 1 : dpi < 264 ? 2 : 3; finer > 1; finer--) {
+        if ((int64_t)finer * times * picture_width <= max_width &&
+            (int64_t)finer * times * picture_height <= max_height) {
+            times *= finer;
+            break;
+        }
+    }
     struct gn_fit fit = {.width = times * picture_width, .height = times * picture_height};
     if (fit.width > max_width || fit.height > max_height)
         fit = gn_fit_picture(picture_width, picture_height, max_width, max_height);

@@ -17,7 +17,10 @@ struct gn_fit gn_fit_picture(int picture_width, int picture_height, int window_w
                              int window_height);
 
 /** The window that a picture opens in: its size times the largest whole number by which it is
- * within 640 x 480; at most max, in the picture's shape. Only width and height are set. */
-struct gn_fit gn_fit_window(int picture_width, int picture_height, int max_width, int max_height);
+ * within 640 x 480; at most max, in the picture's shape. On screens whose pixels are half or a
+ * third as wide as usual (96 dpi; 0: not known), and which have the room, twice or three times
+ * that. Only width and height are set. */
+struct gn_fit gn_fit_window(int picture_width, int picture_height, int max_width, int max_height,
+                            double dpi);
 
 #endif

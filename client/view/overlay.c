@@ -268,6 +268,14 @@ void gn_overlay_draw_help(struct gn_canvas *canvas, const char *title,
     draw(canvas, &b, at, panel_color);
 }
 
+void gn_overlay_draw_hint(struct gn_canvas *canvas, const char *text)
+{
+    struct block b;
+    begin(&b, 0, canvas->width, canvas->height);
+    put(&b, "", text);
+    draw(canvas, &b, measure(&b), panel_color);
+}
+
 void gn_overlay_draw_note(struct gn_canvas *canvas, const char *text, bool is_warning,
                           struct gn_overlay_box taken)
 {

@@ -41,6 +41,9 @@ void gn_overlay_draw_figures(struct gn_canvas *canvas, const struct gn_overlay_f
 void gn_overlay_draw_plan(struct gn_canvas *canvas, const struct gn_msg_receipt *receipt,
                           struct gn_overlay_box taken);
 
+/** A word in the upper left corner. */
+void gn_overlay_draw_hint(struct gn_canvas *canvas, const char *text);
+
 /** A panel in the middle. */
 void gn_overlay_draw_help(struct gn_canvas *canvas, const char *title,
                           const struct gn_overlay_line *lines, int n);

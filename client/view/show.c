@@ -3,66 +3,20 @@
 #include "client/view/show.h"
 
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/view/keep.h"
-#include "client/view/light_ball.h"
-#include "client/view/overlay.h"
-#include "client/view/window.h"
+#include "client/view/show_internal.h"
 #include "common/clock.h"
-#include "common/jpeg.h"
+#include "common/text.h"
 
 /** How long news stays. */
 #define NOTE_NS (3 * GN_NS_PER_S)
-/** Results that the rate and the largest latency are of. */
-#define N_OF_LATE 32
+/** How long the window says which key to begin with, once it has a picture. */
+#define HINT_NS (5 * GN_NS_PER_S)
 /** Pictures that come faster than this are shown by turns. */
 #define PRESENT_NS (8 * GN_NS_PER_MS)
-
-/** What o goes through. */
-enum page { PAGE_NONE = 0, PAGE_FIGURES, PAGE_PLAN, N_PAGES };
-
-static const struct gn_overlay_line keys[] = {
-    {"q, Esc", "quit"},
-    {"f", "full screen"},
-    {"o", "figures of the picture; the plan; none"},
-    {"l", "the light, as a mirror ball sees it"},
-    {"s", "shadows on, off"},
-    {"v", "virtual objects on, off"},
-    {"p", "keep this picture (PNG)"},
-    {"r", "record all (PNG, receipts); end it"},
-    {"h", "these keys"},
-};
-
-struct gn_show {
-    struct gn_window *window;
-    struct gn_keep *keep;
-    struct gn_jpeg *jpeg;
-    struct gn_canvas canvas;
-    struct gn_image8 picture; // what is shown; width 0: nothing yet
-    uint64_t picture_id;
-    struct gn_msg_receipt receipt; // of it
-    struct gn_light_ball light;
-    struct gn_pose world_from_camera;
-    struct gn_show_counts counts; // source: NULL or &source_counts
-    struct gn_source_counts source_counts;
-    enum page page;
-    bool shows_help, shows_light, no_virtual, no_shadow;
-    bool is_stale; // to be drawn again
-    int64_t presented_ns;
-    char note[512];
-    int64_t note_until_ns;
-    char trouble[512]; // "": none
-    char last_drop[256];
-    struct {
-        int64_t at_ns;
-        double latency_ms;
-    } of_late[N_OF_LATE]; // a ring
-    uint64_t n_of_late;
-};
 
 int gn_show_open(const struct gn_show_options *options, struct gn_show **out_show,
                  struct gn_error *out_error)
@@ -74,7 +28,7 @@ int gn_show_open(const struct gn_show_options *options, struct gn_show **out_sho
     s->no_virtual = options->no_virtual;
     s->no_shadow = options->no_shadow;
     s->world_from_camera.rotation[0] = 1;
-    s->is_stale = true;
+    s->is_stale = s->is_hint_wanted = true;
     int err = gn_window_open(options->width, options->height, &s->window, out_error);
     if (!err)
         err = gn_keep_create(options->dir, &s->keep, out_error);
@@ -107,9 +61,24 @@ void gn_show_close(struct gn_show **show)
     free(s);
 }
 
-void gn_show_set_title(struct gn_show *show, const char *title)
+void gn_show_set_room(struct gn_show *show, const char *room)
 {
-    gn_window_set_title(show->window, title);
+    snprintf(show->room, sizeof(show->room), "%s", room);
+    gn_text_clean(show->room);
+}
+
+/** The room, and what is the matter or being done. */
+static void set_title(struct gn_show *s)
+{
+    char title[sizeof(s->title)];
+    const char *what = s->sentence[0]                  ? s->sentence
+                       : gn_keep_is_recording(s->keep) ? "recording"
+                                                       : "h: keys";
+    snprintf(title, sizeof(title), "gnomon%s%s - %s", s->room[0] ? ": room " : "", s->room, what);
+    if (strcmp(title, s->title) == 0)
+        return;
+    memcpy(s->title, title, sizeof(title));
+    gn_window_set_title(s->window, title);
 }
 
 void gn_show_set_wishes(const struct gn_show *show, struct gn_msg_frame *frame)
@@ -132,12 +101,15 @@ void gn_show_put_counts(struct gn_show *show, const struct gn_show_counts *count
     }
 }
 
-void gn_show_set_trouble(struct gn_show *show, const char *sentence)
+void gn_show_set_state(struct gn_show *show, enum gn_show_state state, const char *sentence)
 {
-    sentence = sentence ? sentence : "";
-    if (strncmp(show->trouble, sentence, sizeof(show->trouble) - 1) == 0)
+    char text[sizeof(show->sentence)];
+    snprintf(text, sizeof(text), "%s", sentence);
+    gn_text_clean(text);
+    if (show->state == state && strcmp(show->sentence, text) == 0)
         return;
-    snprintf(show->trouble, sizeof(show->trouble), "%s", sentence);
+    show->state = state;
+    memcpy(show->sentence, text, sizeof(text));
     show->is_stale = true;
 }
 
@@ -169,17 +141,14 @@ void gn_show_take_result(struct gn_show *show, const struct gn_msg_result *resul
 {
     struct gn_show *s = show;
     struct gn_error error = {0};
-    uint64_t slot = s->n_of_late++ % N_OF_LATE;
+    uint64_t slot = s->n_of_late++ % GN_SHOW_OF_LATE;
     s->of_late[slot].at_ns = gn_clock_get_monotonic_ns();
     s->of_late[slot].latency_ms = latency_ms;
     s->receipt = result->receipt;
     s->picture_id = result->id;
     s->is_stale = true;
     const struct gn_msg_result_view *view = &result->views[0];
-    int err = decode(s, view, payload + view->payload_offset, &error);
-    if (!err)
-        err = gn_window_put_picture(s->window, &s->picture, &error);
-    if (err)
+    if (decode(s, view, payload + view->payload_offset, &error) < 0)
         say(s, error.text);
     if (gn_keep_add(s->keep, result, payload, latency_ms, &error) < 0)
         say(s, error.text);
@@ -224,7 +193,7 @@ static bool take_key(struct gn_show *s, int key)
         gn_window_toggle_full_screen(s->window);
         break;
     case 'o':
-        s->page = (enum page)((s->page + 1) % N_PAGES);
+        s->page = (enum gn_show_page)((s->page + 1) % GN_SHOW_N_PAGES);
         break;
     case 'l':
         s->shows_light = !s->shows_light;
@@ -251,73 +220,19 @@ static bool take_key(struct gn_show *s, int key)
     return true;
 }
 
-static void draw_page(struct gn_show *s, struct gn_overlay_box taken)
+/** What goes by itself after a while: news, the hint. */
+static void let_go(struct gn_show *s, int64_t now_ns)
 {
-    struct gn_overlay_figures figures = {
-        .receipt = s->picture.width > 0 ? &s->receipt : NULL,
-        .n_sent = s->counts.n_sent,
-        .n_results = s->counts.n_results,
-        .n_dropped = s->counts.n_dropped,
-        .n_lost = s->counts.n_lost,
-        .last_drop = s->last_drop,
-        .counts = s->counts.source,
-    };
-    if (s->page == PAGE_PLAN) {
-        gn_overlay_draw_plan(&s->canvas, &s->receipt, taken);
-        return;
+    if (s->note[0] && now_ns >= s->note_until_ns) {
+        s->note[0] = '\0';
+        s->is_stale = true;
     }
-    uint64_t n = s->n_of_late < N_OF_LATE ? s->n_of_late : N_OF_LATE;
-    for (uint64_t i = 0; i < n; i++)
-        figures.latency_max_ms = fmax(figures.latency_max_ms, s->of_late[i].latency_ms);
-    if (n > 0)
-        figures.latency_ms = s->of_late[(s->n_of_late - 1) % N_OF_LATE].latency_ms;
-    if (n > 1) {
-        int64_t last_ns = s->of_late[(s->n_of_late - 1) % N_OF_LATE].at_ns;
-        int64_t first_ns = s->of_late[(s->n_of_late - n) % N_OF_LATE].at_ns;
-        if (last_ns > first_ns)
-            figures.rate_hz = (double)(n - 1) * 1e9 / (double)(last_ns - first_ns);
+    if (s->is_hint_wanted && s->picture.width > 0 && s->hint_until_ns == 0)
+        s->hint_until_ns = now_ns + HINT_NS;
+    if (s->is_hint_wanted && s->hint_until_ns > 0 && now_ns >= s->hint_until_ns) {
+        s->is_hint_wanted = false;
+        s->is_stale = true;
     }
-    gn_overlay_draw_figures(&s->canvas, &figures, taken);
-}
-
-/** The sentence at the lower left, if any: what is wrong, what is new, what is being done. */
-static const char *get_note(const struct gn_show *s, bool *out_is_warning)
-{
-    *out_is_warning = s->trouble[0];
-    if (s->trouble[0])
-        return s->trouble;
-    if (s->note[0])
-        return s->note;
-    if (s->picture.width == 0)
-        return s->last_drop[0] ? s->last_drop : "waiting for the first picture";
-    return gn_keep_is_recording(s->keep) ? "recording" : NULL;
-}
-
-/** What lies over the picture; NULL: nothing. */
-static const struct gn_canvas *draw_canvas(struct gn_show *s)
-{
-    bool is_warning;
-    const char *note = get_note(s, &is_warning);
-    if (!note && s->page == PAGE_NONE && !s->shows_light && !s->shows_help)
-        return NULL;
-    int width, height;
-    gn_window_get_size(s->window, &width, &height);
-    if (gn_canvas_begin(&s->canvas, width, height) < 0)
-        return NULL;
-    if (s->shows_help) {
-        gn_overlay_draw_help(&s->canvas, "keys", keys, GN_ARRAY_LEN(keys));
-        return &s->canvas;
-    }
-    struct gn_overlay_box taken = {0};
-    if (s->shows_light) {
-        taken = gn_light_ball_get_box(&s->canvas);
-        gn_light_ball_draw(&s->light, &s->world_from_camera, &s->canvas);
-    }
-    if (s->page != PAGE_NONE)
-        draw_page(s, taken);
-    if (note)
-        gn_overlay_draw_note(&s->canvas, note, is_warning, taken);
-    return &s->canvas;
 }
 
 bool gn_show_pump(struct gn_show *show)
@@ -326,19 +241,21 @@ bool gn_show_pump(struct gn_show *show)
     struct gn_error error = {0};
     int key;
     while ((key = gn_window_poll(s->window, &s->is_stale)) != GN_WINDOW_KEY_NONE) {
+        s->is_stale |= s->is_hint_wanted;
+        s->is_hint_wanted = false;
         if (!take_key(s, key))
             return false;
     }
     int64_t now_ns = gn_clock_get_monotonic_ns();
-    if (s->note[0] && now_ns >= s->note_until_ns) {
-        s->note[0] = '\0';
-        s->is_stale = true;
-    }
-    if (!s->is_stale || now_ns - s->presented_ns < PRESENT_NS)
+    let_go(s, now_ns);
+    set_title(s);
+    // Who cannot be seen need not draw.
+    if (!s->is_stale || now_ns - s->presented_ns < PRESENT_NS || gn_window_is_hidden(s->window))
         return true;
     s->is_stale = false;
     s->presented_ns = now_ns;
-    if (gn_window_present(s->window, draw_canvas(s), &error) < 0)
+    if (gn_window_present(s->window, s->picture.width > 0 ? &s->picture : NULL, gn_show_draw(s),
+                          &error) < 0)
         fprintf(stderr, "gnomon view: %s\n", error.text);
     return true;
 }

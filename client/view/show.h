@@ -27,6 +27,12 @@ struct gn_show_options {
     bool no_shadow;    // at first
 };
 
+enum gn_show_state {
+    GN_SHOW_LIVE = 0,
+    GN_SHOW_WAITING, // for something that is to be expected
+    GN_SHOW_TROUBLE, // stands out
+};
+
 /** What the command has counted. */
 struct gn_show_counts {
     long n_sent, n_results, n_dropped, n_lost;
@@ -43,7 +49,8 @@ GN_MUST_USE int gn_show_open(const struct gn_show_options *options, struct gn_sh
 /** Ends a recording, too. NULL-safe; nulls *show. */
 void gn_show_close(struct gn_show **show);
 
-void gn_show_set_title(struct gn_show *show, const char *title);
+/** The room that shows in the title. Copied. */
+void gn_show_set_room(struct gn_show *show, const char *room);
 
 /** Takes keys and draws. False: the person wants to end. */
 bool gn_show_pump(struct gn_show *show);
@@ -61,7 +68,7 @@ void gn_show_take_dropped(struct gn_show *show, const char *why);
 void gn_show_take_light(struct gn_show *show, const struct gn_msg_lighting_state *state,
                         const uint8_t *payload, size_t payload_bytes);
 
-/** A sentence that stays until another takes its place; NULL or "": all is well. */
-void gn_show_set_trouble(struct gn_show *show, const char *sentence);
+/** Until the next call, in the title and at the foot; sentence: "" where all is well. */
+void gn_show_set_state(struct gn_show *show, enum gn_show_state state, const char *sentence);
 
 #endif

@@ -5,6 +5,7 @@
 #include <SDL.h>
 #include <errno.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "client/view/fit.h"
 
@@ -15,7 +16,9 @@ struct gn_window {
     SDL_Texture *canvas;  // NULL: none yet
     int picture_width, picture_height;
     int canvas_width, canvas_height;
-    bool is_shown;
+    bool is_shown;   // asked to be
+    bool is_hidden;  // nobody can see it
+    SDL_Rect before; // full screen: where it was
 };
 
 static int fail(int err, const char *what, struct gn_error *out_error)
@@ -23,13 +26,17 @@ static int fail(int err, const char *what, struct gn_error *out_error)
     return gn_error_set(out_error, err, "the window: %s: %s", what, SDL_GetError());
 }
 
-/** As large as a desktop has room for. */
+/** As large as a desktop has room for. Other systems than X enlarge windows by themselves. */
 static struct gn_fit choose_size(int width, int height)
 {
-    SDL_Rect room;
+    SDL_Rect room = {0, 0, 1280, 960};
+    float dpi = 0;
+    bool is_x11 = strcmp(SDL_GetCurrentVideoDriver(), "x11") == 0;
     if (SDL_GetDisplayUsableBounds(0, &room) != 0 || room.w < 1 || room.h < 1)
-        return gn_fit_window(width, height, 1280, 960);
-    return gn_fit_window(width, height, room.w, room.h);
+        room = (SDL_Rect){0, 0, 1280, 960};
+    if (!is_x11 || SDL_GetDisplayDPI(0, &dpi, NULL, NULL) != 0)
+        dpi = 0;
+    return gn_fit_window(width, height, room.w, room.h, dpi);
 }
 
 /** The driver's own renderer; where it has none, the one that always works. */
@@ -56,9 +63,8 @@ static const char *choose_driver(void)
     return has_value("DISPLAY") ? "x11" : NULL;
 }
 
-int gn_window_open(int width, int height, struct gn_window **out_window, struct gn_error *out_error)
+static int start_video(struct gn_error *out_error)
 {
-    *out_window = NULL;
     const char *driver = choose_driver();
     if (!driver)
         return gn_error_set(out_error, -ENODEV,
@@ -71,7 +77,23 @@ int gn_window_open(int width, int height, struct gn_window **out_window, struct 
     SDL_SetHint(SDL_HINT_RENDER_VSYNC, "0"); // a connection waits for us
     if (SDL_Init(SDL_INIT_VIDEO) != 0)
         return gn_error_set(out_error, -ENODEV, "no display: %s", SDL_GetError());
-    int err = 0;
+    return 0;
+}
+
+int gn_window_find_display(struct gn_error *out_error)
+{
+    int err = start_video(out_error);
+    if (!err)
+        SDL_Quit();
+    return err;
+}
+
+int gn_window_open(int width, int height, struct gn_window **out_window, struct gn_error *out_error)
+{
+    *out_window = NULL;
+    int err = start_video(out_error);
+    if (err)
+        return err;
     struct gn_window *w = calloc(1, sizeof(*w));
     if (!w) {
         err = gn_error_set(out_error, -ENOMEM, "out of memory");
@@ -115,14 +137,33 @@ void gn_window_set_title(struct gn_window *window, const char *title)
     SDL_SetWindowTitle(window->window, title);
 }
 
+/**
+ * The window manager makes it fill the screen. Where there is none (a kiosk, a bare X server)
+ * nobody does, though SDL 2.26 takes it for done and draws a picture larger than its window: so it
+ * is given the screen's size first, which needs no manager.
+ */
 void gn_window_toggle_full_screen(struct gn_window *window)
 {
-    bool is_full = SDL_GetWindowFlags(window->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
-    SDL_SetWindowFullscreen(window->window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
+    struct gn_window *w = window;
+    bool is_full = SDL_GetWindowFlags(w->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
+    bool is_x11 = strcmp(SDL_GetCurrentVideoDriver(), "x11") == 0;
+    SDL_Rect screen;
+    if (!is_full) {
+        SDL_GetWindowPosition(w->window, &w->before.x, &w->before.y);
+        SDL_GetWindowSize(w->window, &w->before.w, &w->before.h);
+        if (is_x11 && SDL_GetDisplayBounds(SDL_GetWindowDisplayIndex(w->window), &screen) == 0) {
+            SDL_SetWindowPosition(w->window, screen.x, screen.y);
+            SDL_SetWindowSize(w->window, screen.w, screen.h);
+        }
+    }
+    SDL_SetWindowFullscreen(w->window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
+    if (is_full && is_x11) {
+        SDL_SetWindowSize(w->window, w->before.w, w->before.h);
+        SDL_SetWindowPosition(w->window, w->before.x, w->before.y);
+    }
 }
 
-/** Textures do not outlive the device that they are on. The picture comes again with its next
- * frame. */
+/** Textures do not outlive the device that they are on; the next present makes them again. */
 static void drop_textures(struct gn_window *w)
 {
     if (w->picture)
@@ -132,14 +173,31 @@ static void drop_textures(struct gn_window *w)
     w->picture = w->canvas = NULL;
 }
 
+static void take_visibility(struct gn_window *w, Uint8 event)
+{
+    if (event == SDL_WINDOWEVENT_HIDDEN || event == SDL_WINDOWEVENT_MINIMIZED)
+        w->is_hidden = true;
+    if (event == SDL_WINDOWEVENT_SHOWN || event == SDL_WINDOWEVENT_EXPOSED ||
+        event == SDL_WINDOWEVENT_RESTORED)
+        w->is_hidden = false;
+}
+
+bool gn_window_is_hidden(const struct gn_window *window)
+{
+    return window->is_hidden;
+}
+
 int gn_window_poll(struct gn_window *window, bool *out_is_stale)
 {
     SDL_Event event;
     while (SDL_PollEvent(&event)) {
         if (event.type == SDL_QUIT)
             return GN_WINDOW_KEY_CLOSE;
-        if (event.type == SDL_WINDOWEVENT)
+        if (event.type == SDL_WINDOWEVENT || event.type == SDL_RENDER_DEVICE_RESET ||
+            event.type == SDL_RENDER_TARGETS_RESET)
             *out_is_stale = true;
+        if (event.type == SDL_WINDOWEVENT)
+            take_visibility(window, event.window.event);
         if (event.type == SDL_RENDER_DEVICE_RESET)
             drop_textures(window);
         if (event.type != SDL_KEYDOWN || event.key.repeat)
@@ -182,13 +240,6 @@ static int put(struct gn_window *w, const struct gn_image8 *image, Uint32 format
     return 0;
 }
 
-int gn_window_put_picture(struct gn_window *window, const struct gn_image8 *picture,
-                          struct gn_error *out_error)
-{
-    return put(window, picture, SDL_PIXELFORMAT_RGB24, &window->picture, &window->picture_width,
-               &window->picture_height, out_error);
-}
-
 /** Pixels stay pixels where each becomes a whole number of them. */
 static void draw_picture(struct gn_window *w)
 {
@@ -201,21 +252,25 @@ static void draw_picture(struct gn_window *w)
     SDL_RenderCopy(w->renderer, w->picture, NULL, &at);
 }
 
-int gn_window_present(struct gn_window *window, const struct gn_canvas *canvas,
-                      struct gn_error *out_error)
+int gn_window_present(struct gn_window *window, const struct gn_image8 *picture,
+                      const struct gn_canvas *canvas, struct gn_error *out_error)
 {
     struct gn_window *w = window;
     if (!w->is_shown)
         SDL_ShowWindow(w->window);
     w->is_shown = true;
-    int err = canvas ? put(w, &canvas->image, SDL_PIXELFORMAT_RGBA32, &w->canvas, &w->canvas_width,
-                           &w->canvas_height, out_error)
-                     : 0;
+    int err = 0;
+    if (picture)
+        err = put(w, picture, SDL_PIXELFORMAT_RGB24, &w->picture, &w->picture_width,
+                  &w->picture_height, out_error);
+    if (!err && canvas)
+        err = put(w, &canvas->image, SDL_PIXELFORMAT_RGBA32, &w->canvas, &w->canvas_width,
+                  &w->canvas_height, out_error);
     if (err)
         return err;
     SDL_SetRenderDrawColor(w->renderer, 0, 0, 0, 255);
     SDL_RenderClear(w->renderer);
-    if (w->picture)
+    if (picture)
         draw_picture(w);
     if (canvas) {
         SDL_SetTextureBlendMode(w->canvas, SDL_BLENDMODE_BLEND);

@@ -12,6 +12,11 @@ int gn_window_open(int width, int height, struct gn_window **out_window, struct 
     return gn_feature_refuse(GN_FEATURE_WINDOW, out_error);
 }
 
+int gn_window_find_display(struct gn_error *out_error)
+{
+    return gn_feature_refuse(GN_FEATURE_WINDOW, out_error);
+}
+
 /* No window was ever opened: nothing of the following has one. */
 
 void gn_window_close(struct gn_window **window)
@@ -43,18 +48,17 @@ void gn_window_get_size(const struct gn_window *window, int *out_width, int *out
     *out_width = *out_height = 1;
 }
 
-int gn_window_put_picture(struct gn_window *window, const struct gn_image8 *picture,
-                          struct gn_error *out_error)
+bool gn_window_is_hidden(const struct gn_window *window)
+{
+    (void)window;
+    return true;
+}
+
+int gn_window_present(struct gn_window *window, const struct gn_image8 *picture,
+                      const struct gn_canvas *canvas, struct gn_error *out_error)
 {
     (void)window;
     (void)picture;
-    return gn_feature_refuse(GN_FEATURE_WINDOW, out_error);
-}
-
-int gn_window_present(struct gn_window *window, const struct gn_canvas *canvas,
-                      struct gn_error *out_error)
-{
-    (void)window;
     (void)canvas;
     return gn_feature_refuse(GN_FEATURE_WINDOW, out_error);
 }

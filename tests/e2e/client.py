@@ -7,6 +7,7 @@ usage: client.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import socket
@@ -449,6 +450,9 @@ def test_doctor():
         for word in ("room 'demo'", 'protocol 1', 'round trip', '1920x1200', 'OpenEXR', 'gige',
                      'v4l2', 'video', 'vision', 'window'):
             assert word in out, out
+        for part in ('gige', 'v4l2', 'video', 'vision', 'window'):
+            rows = re.findall(r'^(ok|none|absent) +%s +(yes|no) +\S' % part, out, re.M)
+            assert rows in ([('ok', 'yes')], [('none', 'yes')], [('absent', 'no')]), (part, out)
         page = daemon.http_address
         for where, word in (('127.0.0.1:%d' % page[1], 'not that of its page'),
                             ('127.0.0.1:1', 'is gnomond running')):

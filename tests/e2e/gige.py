@@ -139,7 +139,7 @@ def test_stock():
         for who, name in (('any', 'Mono12'), ('ST7', 'RGB8')):
             read_pictures(who, name, 3)
         out, _ = Program(GNOMON, 'doctor', server(daemon)).end()
-        assert re.search(r'^ok +GigE +Aravis-Fake-ST7: .*at 127\.0\.0\.1$', out, re.M), out
+        assert re.search(r'^ok +gige +yes +Aravis-Fake-ST7: .*at 127\.0\.0\.1$', out, re.M), out
         out, err = Program(GNOMON, 'probe', server(daemon), '--gige', 'ST8').end(1)
         assert 'no such camera; there are: Aravis-Fake-ST7' in err and err.count('\n') == 1, err
 

@@ -6,219 +6,17 @@ usage: window.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 """
 import json
 import os
-import random
+import re
 import shutil
 import signal
-import struct
 import subprocess
 import sys
-import tempfile
-import time
 
 sys.path.insert(0, sys.argv[2])
-from gnomond import Daemon, light_up, probe, run_tests  # noqa: E402
-from pictures import png_bytes, read_png  # noqa: E402
-
-GNOMON = os.path.abspath(sys.argv[3])
-WIDTH, HEIGHT = 320, 240
-# 1 m above the floor, looking down: the cube is in the middle, floor all around.
-CAMERA = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH, 'fy': WIDTH, 'cx': WIDTH / 2,
-          'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],
-          'world_from_camera': [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 1, 0, 0, 0, 1]}
-SHOT = random.Random(7).getrandbits(24 * WIDTH * HEIGHT).to_bytes(3 * WIDTH * HEIGHT, 'little')
-ON_CUBE, BESIDE_CUBE = (160, 120), (108, 120)
-# What the keys have done is said for a while in the rows below these bytes.
-UPPER = 3 * WIDTH * 200
-TRIES_S = 60  # generous: the machine may be busy with other tests
-
-
-def wait_for(what, look, timeout=TRIES_S):
-    """What look() gives once it is something."""
-    deadline = time.monotonic() + timeout
-    while True:
-        got = look()
-        if got:
-            return got
-        assert time.monotonic() < deadline, 'never: ' + what
-        time.sleep(0.03)
-
-
-# libdbus and what SDL loads by itself leave memory behind; our own leaks show in client.py.
-ENVIRONMENT = dict(os.environ, ASAN_OPTIONS=os.environ.get('ASAN_OPTIONS', '') + ':detect_leaks=0')
-
-
-class Screen:
-    """An X server whose frame buffer is a file: XWD, as its XWDFile.h has it."""
-
-    def __init__(self, width=800, height=600):
-        self.path = tempfile.mkdtemp(prefix='gnomon-screen.')
-        ours, its = os.pipe()
-        self.process = subprocess.Popen(
-            ['Xvfb', '-displayfd', str(its), '-screen', '0', '%dx%dx24' % (width, height),
-             '-nolisten', 'tcp', '-noreset', '-fbdir', self.path], pass_fds=[its], stderr=subprocess.DEVNULL)
-        os.close(its)
-        with os.fdopen(ours) as end:
-            number = end.readline().strip()
-        assert number.isdigit(), 'Xvfb did not start: %r' % number
-        self.display = ':' + number
-        self.env = dict(ENVIRONMENT, DISPLAY=self.display, SDL_RENDER_DRIVER='software')
-        self.env.pop('SDL_VIDEODRIVER', None)
-        self.env.pop('WAYLAND_DISPLAY', None)
-        wait_for('the screen', lambda: self.do('getdisplaygeometry'))
-
-    def read(self, x, y, width, height):
-        """Pixels as R, G, B."""
-        with open(self.path + '/Xvfb_screen0', 'rb') as f:
-            data = f.read()
-        head = struct.unpack('>25I', data[:100])
-        start, stride = head[0] + 12 * head[19], head[12]
-        out = bytearray(3 * width * height)
-        for row in range(height):
-            at = start + (y + row) * stride + 4 * x
-            for k in range(3):  # stored B, G, R and a byte of nothing
-                out[3 * width * row + k:3 * width * (row + 1):3] = \
-                    data[at + 2 - k:at + 4 * width:4]
-        return bytes(out)
-
-    def do(self, *arguments):
-        return subprocess.run(['xdotool', *map(str, arguments)], env=self.env, timeout=TRIES_S,
-                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout.decode()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait()
-        shutil.rmtree(self.path)
-
-
-class View:
-    """gnomon view in a folder of its own, and its window if there is a screen."""
-
-    def __init__(self, address, *more, screen=None, env=None):
-        self.path = tempfile.mkdtemp(prefix='gnomon-window-test.')
-        self.screen, self.id = screen, None
-        os.mkdir(self.at('shots'))
-        with open(self.at('camera.json'), 'w') as out:
-            json.dump(CAMERA, out)
-        with open(self.at('shots/shot.png'), 'wb') as out:
-            out.write(png_bytes(WIDTH, HEIGHT, SHOT))
-        self.out, self.err = open(self.at('stdout'), 'w'), open(self.at('stderr'), 'w')
-        self.process = subprocess.Popen(
-            [GNOMON, 'view', '--server=%s:%d' % address, '--files', 'shots', '--camera', 'camera.json',
-             '--window', *more], cwd=self.path, stdout=self.out, stderr=self.err,
-            env=screen.env if screen else env)
-        if screen:
-            self.id = int(wait_for('a window', self.find).split()[0])
-            screen.do('windowfocus', self.id)
-
-    def find(self):
-        assert self.process.poll() is None and not self.read('stderr'), self.read('stderr')
-        return self.screen.do('search', '--onlyvisible', '--name', '^gnomon: room demo')
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def read(self, name):
-        with open(self.at(name), errors='replace') as f:
-            return f.read()
-
-    def press(self, key):
-        self.screen.do('key', key)
-
-    def get_box(self):
-        text = self.screen.do('getwindowgeometry', '--shell', self.id)
-        values = dict(line.split('=') for line in text.splitlines())
-        return tuple(int(values[name]) for name in ('X', 'Y', 'WIDTH', 'HEIGHT'))
-
-    def see(self):
-        """Width, height and pixels of the window."""
-        x, y, width, height = self.get_box()
-        return width, height, self.screen.read(x, y, width, height)
-
-    def resize(self, width, height):
-        self.screen.do('windowsize', self.id, width, height)
-        wait_for('the new size', lambda: self.get_box()[2:] == (width, height))
-
-    def end(self, timeout=TRIES_S):
-        """Exit status, standard output and standard error; the folder stays."""
-        try:
-            status = self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            raise AssertionError('did not end: ' + self.read('stdout') + self.read('stderr'))
-        self.out.close()
-        self.err.close()
-        out, err = self.read('stdout'), self.read('stderr')
-        assert 'Sanitizer' not in err and 'runtime error' not in err, err
-        return status, out, err
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-        self.out.close()
-        self.err.close()
-        shutil.rmtree(self.path)
-
-
-def lit(listen='127.0.0.1:0'):
-    """A room whose picture, once its light is there, does not change by itself."""
-    return Daemon('refine = false', listen=listen)
-
-
-def pixel(data, at, width=WIDTH):
-    return data[3 * (at[1] * width + at[0]):][:3]
-
-
-def enlarge(data, times):
-    rows = [data[3 * WIDTH * y:3 * WIDTH * (y + 1)] for y in range(HEIGHT)]
-    return b''.join(b''.join(row[3 * x:3 * x + 3] * times for x in range(WIDTH)) * times
-                    for row in rows)
-
-
-def find_differences(a, b, width):
-    """The box of the pixels that differ: x0, y0, x1, y1, the last ones outside; None: none."""
-    stride, xs, ys = 3 * width, set(), set()
-    for at in range(0, len(a), stride):
-        x, y = a[at:at + stride], b[at:at + stride]
-        if x != y:
-            ys.add(at // stride)
-            xs.update(i // 3 for i in range(stride) if x[i] != y[i])
-    return (min(xs), min(ys), max(xs) + 1, max(ys) + 1) if xs else None
-
-
-class Watch:
-    """A view at one pixel a pixel, and what it shows undisturbed."""
-
-    def __init__(self, view):
-        self.view = view
-        view.resize(WIDTH, HEIGHT)
-
-    def wait(self, what, claim):
-        """The window's pixels once the claim holds of them."""
-        def look():
-            width, height, data = self.view.see()
-            return data if (width, height) == (WIDTH, HEIGHT) and claim(data) else None
-        try:
-            return wait_for(what, look)
-        except AssertionError:
-            with tempfile.NamedTemporaryFile(prefix='gnomon-window-test.', suffix='.png',
-                                             delete=False) as out:
-                out.write(png_bytes(*self.view.see()))
-            print('# the window is kept in ' + out.name)
-            raise
-
-    def wait_composite(self):
-        """Until the window shows what the server sent, to the bit, and that is a composite."""
-        def claim(data):
-            path = self.view.at('out/shot.png')
-            return os.path.exists(path) and data == read_png(path)[2] != SHOT
-        return self.wait('the composite on the screen', claim)
+from gnomond import light_up, probe, run_tests  # noqa: E402
+from pictures import read_png  # noqa: E402
+from window_stage import (BESIDE_CUBE, ENVIRONMENT, GNOMON, HEIGHT, ON_CUBE, SHOT, UPPER, WIDTH,  # noqa: E402
+                          Screen, View, Watch, enlarge, find_differences, lit, pixel, wait_for)
 
 
 def test_picture_and_toggles():
@@ -341,6 +139,7 @@ def test_server_lost():
             daemon.kill()
             light.close()
             wait_for('that said', lambda: 'the server is lost: ' in view.read('stderr'))
+            wait_for('its title', lambda: view.get_title().startswith('gnomon: room demo - server lost'))
             seen = watch.wait('a warning', lambda d: find_differences(d, whole, WIDTH))
             x0, y0, x1, y1 = find_differences(seen, whole, WIDTH)
             assert x0 == 6 and y1 == HEIGHT - 6 and y0 > HEIGHT / 2, (x0, y0, x1, y1)
@@ -368,6 +167,93 @@ def test_server_lost():
             assert len(lost) == 1 and ', 1 frame lost' in out, (lost, out[-300:])
 
 
+def test_full_screen():
+    """With no window manager, as here, f fills the screen with the whole picture all the same, and back."""
+    with lit() as daemon, probe(daemon) as light, Screen(2 * WIDTH, 2 * HEIGHT) as screen:
+        light_up(light)
+        with View(daemon.address, '--out', 'out', '--loop', '--rate', '10', screen=screen) as view:
+            watch = Watch(view)
+            whole = watch.wait_composite()
+            before = view.get_box()
+            view.press('f')
+            wait_for('the whole screen', lambda: view.get_box() == (0, 0, 2 * WIDTH, 2 * HEIGHT))
+            wait_for('the whole picture', lambda: screen.read(0, 0, 2 * WIDTH, 2 * HEIGHT) ==
+                     enlarge(whole, 2))
+            view.press('f')
+            wait_for('the window', lambda: view.get_box() == before)
+            watch.wait('the picture', lambda d: d == whole)
+            screen.do('windowunmap', view.id)
+            screen.do('windowmap', view.id)
+            watch.wait('the picture once more', lambda d: d == whole)
+            screen.do('windowfocus', view.id)
+            view.press('q')
+            assert view.end()[0] == 0
+
+
+def test_server_late():
+    """The window opens before its server is there, says so, and goes on when it comes."""
+    with lit() as daemon:
+        address = daemon.address
+    with Screen() as screen:
+        with View(address, '--out', 'out', '--loop', '--rate', '10', screen=screen,
+                  title='gnomon - waiting for gnomond at %s:%d$' % address) as view:
+            assert view.get_box()[2:] == (2 * WIDTH, 2 * HEIGHT), view.get_box()
+
+            def is_said():
+                width, _, seen = view.see()
+                bright = {i // 3 // width for i in range(0, len(seen), 3) if min(seen[i:i + 3]) >= 240}
+                return any(y < 20 for y in bright) and any(y > 2 * HEIGHT - 20 for y in bright)
+            wait_for('the hint and a word about it', is_said)
+            with lit('%s:%d' % address) as daemon, probe(daemon) as light:
+                light_up(light)
+                watch = Watch(view)
+                watch.wait_composite()
+                wait_for('its room', lambda: view.get_title() == 'gnomon: room demo - h: keys')
+                view.press('q')
+                status, out, err = view.end()
+            assert status == 0 and 'connected again' not in out, out
+            assert err.count('\n') == 1 and 'is gnomond running' in err and err.endswith('waiting for it\n'), err
+        with lit() as daemon:  # one that is there and refuses is not waited for
+            with View(daemon.address, '--room', 'attic', screen=screen, title='') as view:
+                status, _, err = view.end()
+                assert status == 1 and err.count('\n') == 1 and 'no room of that name' in err, err
+
+
+def close_by_manager(view):
+    view.screen.ask_to_close(view.id)
+
+
+def close_by_signal(view):
+    view.process.send_signal(signal.SIGTERM)
+
+
+def test_closing():
+    """The close button and SIGTERM end it well: receipts of --out and of a recording are whole."""
+    with lit() as daemon, probe(daemon) as light, Screen() as screen:
+        light_up(light)
+        for close in (close_by_manager, close_by_signal):
+            with View(daemon.address, '--out', 'out', '--loop', '--rate', '10', screen=screen) as view:
+                wait_for('a picture', lambda: 'frame 2:' in view.read('stdout'))
+                view.press('r')
+                wait_for('that said', lambda: view.get_title() == 'gnomon: room demo - recording')
+                wait_for('frames', lambda: view.read('stdout').count('frame ') > 4)
+                close(view)
+                status, out, err = view.end()
+                assert (status, err) == (0, '') and '; in out\n' in out, (status, out, err)
+                folder, = (n for n in os.listdir(view.at('out')) if n.startswith('gnomon-'))
+                for name in ('out', 'out/' + folder):
+                    with open(view.at(name + '/view.json')) as f:
+                        assert json.load(f)['results'] > 0
+                    assert not [n for n in os.listdir(view.at(name)) if n.endswith('.tmp')]
+    with Screen() as screen:
+        for close in (close_by_manager, close_by_signal):
+            with View(('127.0.0.1', 1), '--out', 'out', screen=screen, title='gnomon - waiting') as view:
+                close(view)
+                status, _, err = view.end()
+                assert status == 1 and err.endswith('ended before gnomond at 127.0.0.1:1 was there\n'), err
+                assert not os.path.exists(view.at('out'))
+
+
 def test_no_display():
     """Where there is no display, files are written, and that is said in one line."""
     bare = {k: v for k, v in ENVIRONMENT.items()
@@ -389,12 +275,12 @@ def test_no_display():
     assert done.returncode == 2 and b'--out DIR' in done.stderr and b'--window' in done.stderr
 
 
-if b'ok     window' not in subprocess.run([GNOMON, 'doctor'], stdout=subprocess.PIPE,
-                                          stderr=subprocess.DEVNULL).stdout:
+if not re.search(rb'^\w+ +window +yes', subprocess.run([GNOMON, 'doctor'], stdout=subprocess.PIPE).stdout, re.M):
     print('1..0 # SKIP built without windows (libsdl2-dev)')
     sys.exit(0)
 for tool in ('Xvfb', 'xdotool'):
     if not shutil.which(tool):
         print('1..0 # SKIP no %s (deploy/install-packages test)' % tool)
         sys.exit(0)
-run_tests([test_picture_and_toggles, test_overlays, test_keeping, test_server_lost, test_no_display])
+run_tests([test_picture_and_toggles, test_overlays, test_keeping, test_full_screen,
+           test_server_late, test_server_lost, test_closing, test_no_display])

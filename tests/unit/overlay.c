@@ -33,11 +33,16 @@ static void test_fit(void **state)
     assert_fit(gn_fit_picture(1920, 1080, 1000, 1000), 0, 218, 1000, 563); // 562.5
     assert_fit(gn_fit_picture(16384, 1, 100, 100), 0, 49, 100, 1);
     assert_fit(gn_fit_picture(65536, 65536, 65536, 65536), 0, 0, 65536, 65536);
-    assert_fit(gn_fit_window(640, 480, 1920, 1080), 0, 0, 640, 480);
-    assert_fit(gn_fit_window(320, 240, 1920, 1080), 0, 0, 640, 480);
-    assert_fit(gn_fit_window(64, 48, 1920, 1080), 0, 0, 640, 480);
-    assert_fit(gn_fit_window(400, 100, 1920, 1080), 0, 0, 400, 100);
-    assert_fit(gn_fit_window(1920, 1080, 1280, 800), 0, 0, 1280, 720);
+    assert_fit(gn_fit_window(640, 480, 1920, 1080, 0), 0, 0, 640, 480);
+    assert_fit(gn_fit_window(320, 240, 1920, 1080, 0), 0, 0, 640, 480);
+    assert_fit(gn_fit_window(64, 48, 1920, 1080, 0), 0, 0, 640, 480);
+    assert_fit(gn_fit_window(400, 100, 1920, 1080, 0), 0, 0, 400, 100);
+    assert_fit(gn_fit_window(1920, 1080, 1280, 800, 0), 0, 0, 1280, 720);
+    assert_fit(gn_fit_window(320, 240, 1920, 1080, 109), 0, 0, 640, 480);
+    assert_fit(gn_fit_window(320, 240, 2560, 1600, 216), 0, 0, 1280, 960);
+    assert_fit(gn_fit_window(320, 240, 3840, 2160, 282), 0, 0, 1920, 1440);
+    assert_fit(gn_fit_window(640, 480, 1920, 1080, 282), 0, 0, 1280, 960);
+    assert_fit(gn_fit_window(1920, 1080, 2560, 1600, 216), 0, 0, 1920, 1080);
 }
 
 static const uint8_t *get_pixel(const struct gn_canvas *canvas, int x, int y)
