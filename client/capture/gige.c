@@ -37,11 +37,26 @@
 /** How often a lost camera is looked for everywhere: it may have another address now. */
 #define SEARCH_NS (5 * GN_NS_PER_S)
 
+/** How long the reader waits until the thread begins to set the camera: 5 s. */
+#define SETTING_TICKS 100
+
 /** A picture on its way from the thread to the reader. */
 struct picture {
     ArvBuffer *buffer; // owned; NULL: none
     int64_t time_ns;
-    uint64_t opening; // of which opening of the camera its buffer is
+    double exposure_us; // as the camera says with it; 0: it does not
+    uint64_t opening;   // of which opening of the camera its buffer is
+};
+
+/** What the reader has the thread do with the exposure; the thread writes the answer. */
+struct setting {
+    enum { SETTING_HOLD, SETTING_SET, SETTING_RESTORE } what;
+    enum gn_exposure_unit unit;
+    double value;
+    struct gn_exposure range; // of HOLD; now: of SET, too
+    int err;
+    struct gn_error error;
+    bool is_done; // guarded by mu
 };
 
 struct gige {
@@ -60,6 +75,7 @@ struct gige {
     struct gn_gige_device device;
     struct gn_device_clock clock;
     uint64_t frame_id;           // of the last picture; 0: none yet
+    struct gn_gige_noted noted;  // of the exposure, while it is held
     struct gn_thread undertaker; // closes what does not answer any more, which takes seconds
     struct gn_gige_device dead;
     // owner: reader
@@ -72,6 +88,8 @@ struct gige {
     ArvStream *stream;     // guarded by mu: buffers go back to it; NULL while the camera is lost
     uint64_t opening;      // guarded by mu
     struct gn_error news;  // guarded by mu; "": none
+    struct setting *asked; // guarded by mu: not begun yet; NULL: none
+    struct gn_cond answered;
     struct gn_source_counts counts;      // guarded by mu
     uint64_t stream_lost, stream_resent; // guarded by mu: of the openings before this one
 };
@@ -118,18 +136,17 @@ static bool is_whole(const struct gige *s, ArvBuffer *buffer)
 }
 
 /**
- * When the middle of the exposure was. Aravis notes g_get_real_time() at the first packet; the
- * camera's clock smooths that (device_clock.h), and no packet leaves before the exposure has ended.
+ * When the exposure ended: no packet leaves before. Aravis notes g_get_real_time() at the first
+ * packet; the camera's clock smooths that (device_clock.h).
  */
-static int64_t get_time_ns(struct gige *s, ArvBuffer *buffer)
+static int64_t get_end_ns(struct gige *s, ArvBuffer *buffer)
 {
     int64_t now_ns = gn_clock_get_monotonic_ns();
     int64_t age_ns = gn_clock_get_realtime_ns() - (int64_t)arv_buffer_get_system_timestamp(buffer);
     if (age_ns < 0 || age_ns > GN_NS_PER_S) // the wall clock was set meanwhile
         age_ns = 0;
-    int64_t time_ns = gn_device_clock_map(&s->clock, gn_gige_device_get_stamp(&s->device, buffer),
-                                          now_ns - age_ns);
-    return time_ns - (int64_t)(s->device.exposure_us * 500);
+    return gn_device_clock_map(&s->clock, gn_gige_device_get_stamp(&s->device, buffer),
+                               now_ns - age_ns);
 }
 
 /** Pictures between the last and this of which not a packet came. Ids count up from 1, those of 16
@@ -150,7 +167,12 @@ static uint64_t count_gap(struct gige *s, uint64_t id)
 static void take_buffer(struct gige *s, ArvBuffer *buffer)
 {
     bool is_good = is_whole(s, buffer);
-    struct picture p = {buffer, is_good ? get_time_ns(s, buffer) : 0, 0};
+    struct picture p = {.buffer = buffer};
+    if (is_good) { // its time is the middle of the exposure
+        p.exposure_us = gn_gige_device_get_exposure(&s->device, buffer);
+        double exposure_us = p.exposure_us > 0 ? p.exposure_us : s->device.exposure_us;
+        p.time_ns = get_end_ns(s, buffer) - (int64_t)(exposure_us * 500);
+    }
     uint64_t n_lost = count_gap(s, arv_buffer_get_frame_id(buffer));
     gn_mutex_lock(&s->mu);
     p.opening = s->opening;
@@ -208,12 +230,44 @@ static void lose(struct gige *s)
         bury(&s->dead);
 }
 
+/** Does what the reader asks for. Returns whether something was asked. */
+static bool answer_setting(struct gige *s)
+{
+    gn_mutex_lock(&s->mu);
+    struct setting *asked = s->asked;
+    s->asked = NULL;
+    gn_mutex_unlock(&s->mu);
+    if (!asked)
+        return false;
+    if (asked->what == SETTING_HOLD)
+        asked->err = gn_gige_exposure_hold(&s->device, s->id, asked->unit, &s->noted, &asked->range,
+                                           &asked->error);
+    else if (asked->what == SETTING_SET)
+        asked->err =
+            gn_gige_exposure_set(&s->device, s->id, asked->value, &asked->range.now, &asked->error);
+    else
+        asked->err = gn_gige_exposure_restore(&s->device, s->id, &s->noted, &asked->error);
+    if (asked->what == SETTING_SET && !asked->err)
+        s->options.exposure_us = asked->range.now; // what it has when it was lost and is back
+    gn_mutex_lock(&s->mu);
+    asked->is_done = true;
+    gn_cond_signal(&s->answered);
+    gn_mutex_unlock(&s->mu);
+    return true;
+}
+
 /** Reads pictures until the camera is silent or the source ends. */
 static void stream_pictures(struct gige *s)
 {
     int64_t limit_ns = get_silence_ns(&s->device), silent_ns = 0;
     int64_t left_ns = limit_ns > FIRST_PICTURE_NS ? limit_ns : FIRST_PICTURE_NS;
     while (!atomic_load(&s->is_ending)) {
+        if (answer_setting(s)) { // the picture that is on its way may be as long as the one before
+            int64_t before_ns = limit_ns;
+            limit_ns = get_silence_ns(&s->device);
+            left_ns = limit_ns > before_ns ? limit_ns : before_ns;
+            silent_ns = 0;
+        }
         int64_t begin_ns = gn_clock_get_monotonic_ns();
         ArvBuffer *buffer = arv_stream_timeout_pop_buffer(s->device.stream, TICK_US);
         int64_t waited_ns = gn_clock_get_monotonic_ns() - begin_ns;
@@ -349,6 +403,8 @@ static int gige_read(struct gn_source *source, struct gn_capture *out, struct gn
     *out = (struct gn_capture){
         .name = s->name,
         .time_ns = s->held.time_ns,
+        .exposure_us = s->held.exposure_us,
+        .bits = s->format->bits,
         .width = s->width,
         .height = s->height,
         .format = format,
@@ -374,6 +430,50 @@ static void gige_get_counts(const struct gn_source *source, struct gn_source_cou
     gn_mutex_unlock(&s->mu);
 }
 
+/** Has the thread do it, and waits. */
+static int ask(struct gige *s, struct setting *setting, struct gn_error *out_error)
+{
+    gn_mutex_lock(&s->mu);
+    s->asked = setting;
+    // Waits are counted, not time: this thread is not alone where the machine stood still. What was
+    // begun must end: the answer lies here.
+    for (int i = 0; !setting->is_done && (i < SETTING_TICKS || s->asked != setting); i++)
+        (void)!gn_cond_wait_until(&s->answered, &s->mu,
+                                  gn_clock_get_monotonic_ns() + TICK_US * GN_NS_PER_US);
+    bool is_done = setting->is_done;
+    s->asked = NULL;
+    gn_mutex_unlock(&s->mu);
+    if (!is_done)
+        return gn_error_set(out_error, -ENODEV, "camera %s: it is lost, and cannot be set", s->id);
+    return setting->err ? gn_error_set(out_error, setting->err, "%s", setting->error.text) : 0;
+}
+
+static int gige_hold_exposure(struct gn_source *source, enum gn_exposure_unit unit,
+                              struct gn_exposure *out, struct gn_error *out_error)
+{
+    struct setting setting = {.what = SETTING_HOLD, .unit = unit};
+    int err = ask((struct gige *)source, &setting, out_error);
+    if (!err)
+        *out = setting.range;
+    return err;
+}
+
+static int gige_set_exposure(struct gn_source *source, double value, double *out_value,
+                             struct gn_error *out_error)
+{
+    struct setting setting = {.what = SETTING_SET, .value = value};
+    int err = ask((struct gige *)source, &setting, out_error);
+    if (!err)
+        *out_value = setting.range.now;
+    return err;
+}
+
+static int gige_restore_exposure(struct gn_source *source, struct gn_error *out_error)
+{
+    struct setting setting = {.what = SETTING_RESTORE};
+    return ask((struct gige *)source, &setting, out_error);
+}
+
 static void gige_close(struct gn_source *source)
 {
     struct gige *s = (struct gige *)source;
@@ -386,6 +486,7 @@ static void gige_close(struct gn_source *source)
     return_buffer_locked(s, &s->newest);
     gn_mutex_unlock(&s->mu);
     gn_gige_device_close(&s->device);
+    gn_cond_finish(&s->answered);
     gn_mutex_finish(&s->mu);
     if (s->head.fd >= 0)
         close(s->head.fd);
@@ -394,8 +495,12 @@ static void gige_close(struct gn_source *source)
     free(s);
 }
 
-static const struct gn_source_ops gige_ops = {
-    .read = gige_read, .get_counts = gige_get_counts, .close = gige_close};
+static const struct gn_source_ops gige_ops = {.read = gige_read,
+                                              .get_counts = gige_get_counts,
+                                              .hold_exposure = gige_hold_exposure,
+                                              .set_exposure = gige_set_exposure,
+                                              .restore_exposure = gige_restore_exposure,
+                                              .close = gige_close};
 
 /** What reading needs of memory, once the picture's size is known. */
 static int prepare(struct gige *s, struct gn_error *out_error)
@@ -424,7 +529,10 @@ int gn_gige_open(const struct gn_live_options *options, struct gn_source **out_s
 {
     *out_source = NULL;
     struct gige *s = calloc(1, sizeof(*s));
-    if (!s || gn_mutex_init(&s->mu) < 0) {
+    bool has_mutex = s && gn_mutex_init(&s->mu) == 0;
+    if (!has_mutex || gn_cond_init(&s->answered) < 0) {
+        if (has_mutex)
+            gn_mutex_finish(&s->mu);
         free(s);
         return gn_error_set(out_error, -ENOMEM, "out of memory");
     }

@@ -296,10 +296,12 @@ static void set_chunks(struct gn_gige_device *d)
     guint64 ticks_per_s = arv_gv_device_get_timestamp_tick_frequency(
         ARV_GV_DEVICE(arv_camera_get_device(d->camera)), NULL);
     d->ns_per_tick = ticks_per_s > 0 ? 1e9 / (double)ticks_per_s : 1;
-    if (!error)
+    if (!error) {
+        arv_camera_set_chunk_state(d->camera, "ExposureTime", TRUE, NULL); // where it has that, too
         d->chunks = arv_camera_create_chunk_parser(d->camera);
-    else
+    } else {
         arv_camera_set_chunk_mode(d->camera, FALSE, NULL);
+    }
     g_clear_error(&error);
 }
 
@@ -317,6 +319,18 @@ uint64_t gn_gige_device_get_stamp(const struct gn_gige_device *device, ArvBuffer
     // A clock of 1 GHz, the usual one, needs no rounding.
     double ns = (double)ticks * device->ns_per_tick;
     return device->ns_per_tick == 1 ? (uint64_t)ticks : ns < 9e18 ? (uint64_t)ns : 0;
+}
+
+double gn_gige_device_get_exposure(const struct gn_gige_device *device, ArvBuffer *buffer)
+{
+    GError *error = NULL;
+    if (!device->chunks || !arv_buffer_has_chunks(buffer))
+        return 0;
+    double us =
+        arv_chunk_parser_get_float_value(device->chunks, buffer, "ChunkExposureTime", &error);
+    bool is_good = !error && us > 0 && us < 1e12;
+    g_clear_error(&error);
+    return is_good ? us : 0;
 }
 
 static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *place,

@@ -57,6 +57,26 @@ GN_MUST_USE int gn_gige_device_open(struct gn_gige_place *place,
  * chunk, else that of its leader; 0: it does not say. */
 uint64_t gn_gige_device_get_stamp(const struct gn_gige_device *device, struct _ArvBuffer *buffer);
 
+/** The exposure time that the camera says with a picture, us, in its chunk; 0: it does not. */
+double gn_gige_device_get_exposure(const struct gn_gige_device *device, struct _ArvBuffer *buffer);
+
+/** What was noted of a camera whose exposure is held; all-zero: it is not. "": it has no such. */
+struct gn_gige_noted {
+    bool is_held;
+    double exposure_us;
+    char automatics[3][32]; // ExposureAuto, GainAuto, BalanceWhiteAuto
+};
+
+/** As gn_source_hold_exposure, _set_ and _restore_; id: what the camera is called in sentences. */
+GN_MUST_USE int gn_gige_exposure_hold(struct gn_gige_device *device, const char *id,
+                                      enum gn_exposure_unit unit, struct gn_gige_noted *noted,
+                                      struct gn_exposure *out, struct gn_error *out_error);
+GN_MUST_USE int gn_gige_exposure_set(struct gn_gige_device *device, const char *id,
+                                     double exposure_us, double *out_exposure_us,
+                                     struct gn_error *out_error);
+GN_MUST_USE int gn_gige_exposure_restore(struct gn_gige_device *device, const char *id,
+                                         struct gn_gige_noted *noted, struct gn_error *out_error);
+
 /** Ends the stream and gives the camera up; takes seconds where it does not answer any more. */
 void gn_gige_device_close(struct gn_gige_device *device);
 

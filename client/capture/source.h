@@ -35,11 +35,13 @@ enum gn_capture_format {
 
 /** One picture. */
 struct gn_capture {
-    const char *name; // what files written about it are called; borrowed until the next read
-    double time_s;    // recordings: since the source's first picture
-    int64_t time_ns;  // live: when it was taken, CLOCK_MONOTONIC; 0 in recordings
-    int width;        // px
-    int height;       // px
+    const char *name;   // what files written about it are called; borrowed until the next read
+    double time_s;      // recordings: since the source's first picture
+    int64_t time_ns;    // live: when it was taken, CLOCK_MONOTONIC; 0 in recordings
+    double exposure_us; // as the camera says with the picture; 0: it does not
+    int bits;           // significant bits of the camera's codes; 0: those of format
+    int width;          // px
+    int height;         // px
     enum gn_capture_format format;
     const uint8_t *data; // borrowed until the next read
     size_t data_bytes;
@@ -61,12 +63,26 @@ struct gn_source_counts {
     uint64_t copied_bytes;     // of these, how many we wrote: once each, or not at all
 };
 
+/** The exposure of a live source, in the unit that it is held in. */
+struct gn_exposure {
+    double now, least, most;
+};
+
+/** How a live source's exposure is held: by its time, us, or by the camera's own counts (lines). */
+enum gn_exposure_unit { GN_EXPOSURE_US = 0, GN_EXPOSURE_COUNTS };
+
 struct gn_source;
 
 /** What a kind of source does; see the functions below. */
 struct gn_source_ops {
     int (*read)(struct gn_source *source, struct gn_capture *out, struct gn_error *out_error);
     void (*get_counts)(const struct gn_source *source, struct gn_source_counts *out); // or NULL
+    int (*hold_exposure)(struct gn_source *source, enum gn_exposure_unit unit,
+                         struct gn_exposure *out,
+                         struct gn_error *out_error); // or these three NULL
+    int (*set_exposure)(struct gn_source *source, double value, double *out_value,
+                        struct gn_error *out_error);
+    int (*restore_exposure)(struct gn_source *source, struct gn_error *out_error);
     void (*close)(struct gn_source *source);
 };
 
@@ -103,6 +119,24 @@ GN_MUST_USE int gn_source_read(struct gn_source *source, struct gn_capture *out,
 
 /** What a live source has counted; zeros for recordings. */
 void gn_source_get_counts(const struct gn_source *source, struct gn_source_counts *out);
+
+/**
+ * Begins to set a live source's exposure by hand: notes what it is set to and switches automatic
+ * exposure, gain and white balance off. Returns 0; -ENOTSUP (a recording, or a camera whose
+ * exposure cannot be set in this unit) or another negative errno, and a sentence: all is as it was.
+ */
+GN_MUST_USE int gn_source_hold_exposure(struct gn_source *source, enum gn_exposure_unit unit,
+                                        struct gn_exposure *out, struct gn_error *out_error);
+/**
+ * Sets an exposure that is held. *out_value: what the camera says that it took, which may be a step
+ * off. Pictures that come at once may still have the one before. Returns 0, -ERANGE (not in what
+ * gn_source_hold_exposure told) or another negative errno, and a sentence.
+ */
+GN_MUST_USE int gn_source_set_exposure(struct gn_source *source, double value, double *out_value,
+                                       struct gn_error *out_error);
+/** Puts back what gn_source_hold_exposure has noted, as far as it can; nothing where nothing is
+ * held. Returns 0, or a negative errno and a sentence on the first setting that stays. */
+GN_MUST_USE int gn_source_restore_exposure(struct gn_source *source, struct gn_error *out_error);
 
 /** NULL-safe; nulls *source. */
 void gn_source_close(struct gn_source **source);

@@ -32,6 +32,7 @@ struct v4l2_source {
     struct gn_v4l2_layout layout;
     int64_t frame_ns; // 0: unknown
     struct gn_v4l2_stream stream;
+    struct gn_v4l2_exposure exposure;
     bool has_picture;     // one has come since this opening
     int64_t last_ns;      // when, or of the opening
     int64_t retry_ns;     // when a lost camera is looked for next
@@ -155,6 +156,7 @@ static void give(struct v4l2_source *s, const struct gn_v4l2_picture *p, struct 
         .time_ns = get_time_ns(s, &p->info),
         .width = s->layout.width,
         .height = s->layout.height,
+        .bits = s->layout.pixels->depth,
         .format = s->layout.format,
         .data = data,
         .data_bytes = n_bytes,
@@ -271,6 +273,43 @@ static void v4l2_get_counts(const struct gn_source *source, struct gn_source_cou
     *out = ((const struct v4l2_source *)source)->counts;
 }
 
+/** A camera that is away cannot be set. */
+static int check_there(const struct v4l2_source *s, struct gn_error *out_error)
+{
+    return s->device.fd >= 0 ? 0
+                             : gn_error_set(out_error, -ENODEV, "%s (%s): it is lost",
+                                            s->device.path, s->device.card);
+}
+
+static int v4l2_hold_exposure(struct gn_source *source, enum gn_exposure_unit unit,
+                              struct gn_exposure *out, struct gn_error *out_error)
+{
+    struct v4l2_source *s = (struct v4l2_source *)source;
+    int err = check_there(s, out_error);
+    return err ? err : gn_v4l2_exposure_hold(&s->device, unit, &s->exposure, out, out_error);
+}
+
+static int v4l2_set_exposure(struct gn_source *source, double value, double *out_value,
+                             struct gn_error *out_error)
+{
+    struct v4l2_source *s = (struct v4l2_source *)source;
+    int err = check_there(s, out_error);
+    if (!err)
+        err = gn_v4l2_exposure_set(&s->device, &s->exposure, value, out_value, out_error);
+    if (!err && s->exposure.unit_us > 0)
+        s->options.exposure_us = *out_value; // what it has when it was lost and is back
+    return err;
+}
+
+static int v4l2_restore_exposure(struct gn_source *source, struct gn_error *out_error)
+{
+    struct v4l2_source *s = (struct v4l2_source *)source;
+    if (s->exposure.n_noted == 0)
+        return 0;
+    int err = check_there(s, out_error);
+    return err ? err : gn_v4l2_exposure_restore(&s->device, &s->exposure, out_error);
+}
+
 static void v4l2_close(struct gn_source *source)
 {
     struct v4l2_source *s = (struct v4l2_source *)source;
@@ -282,8 +321,12 @@ static void v4l2_close(struct gn_source *source)
     free(s);
 }
 
-static const struct gn_source_ops v4l2_ops = {
-    .read = v4l2_read, .get_counts = v4l2_get_counts, .close = v4l2_close};
+static const struct gn_source_ops v4l2_ops = {.read = v4l2_read,
+                                              .get_counts = v4l2_get_counts,
+                                              .hold_exposure = v4l2_hold_exposure,
+                                              .set_exposure = v4l2_set_exposure,
+                                              .restore_exposure = v4l2_restore_exposure,
+                                              .close = v4l2_close};
 
 /** A copy of text, which may be NULL. */
 static int keep(const char *text, char **out)

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "client/capture/v4l2_device.h"
+#include "proto/attr.h"
 
 /** Most controls that are asked for: a driver may never end its list. */
 #define MAX_CONTROLS 512
@@ -204,4 +205,105 @@ int gn_v4l2_device_set_controls(const struct gn_v4l2_device *device,
         next += n + (next[n] == ',');
     }
     return err;
+}
+
+/** Notes what a control is, where the camera has it, and sets it. */
+static int change(const struct gn_v4l2_device *d, struct gn_v4l2_exposure *exposure, uint32_t id,
+                  int32_t value, struct gn_error *out_error)
+{
+    struct v4l2_queryctrl q;
+    struct v4l2_control c = {.id = id};
+    if (!find_control(d, id, &q) || gn_v4l2_device_call(d, VIDIOC_G_CTRL, &c) != 0 ||
+        c.value == value)
+        return 0;
+    exposure->noted[exposure->n_noted].id = id;
+    exposure->noted[exposure->n_noted++].value = c.value;
+    return set_value(d, &q, value, out_error);
+}
+
+int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_unit unit,
+                          struct gn_v4l2_exposure *exposure, struct gn_exposure *out,
+                          struct gn_error *out_error)
+{
+    static const struct {
+        uint32_t id;
+        int32_t value;
+    } automatics[] = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
+                      {V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0},
+                      {V4L2_CID_AUTOGAIN, 0},
+                      {V4L2_CID_AUTO_WHITE_BALANCE, 0}};
+    struct gn_v4l2_exposure held = {.unit_us = unit == GN_EXPOSURE_US ? EXPOSURE_UNIT_US : 0};
+    struct v4l2_queryctrl q;
+    held.id = unit == GN_EXPOSURE_US ? V4L2_CID_EXPOSURE_ABSOLUTE : V4L2_CID_EXPOSURE;
+    if (!find_control(device, held.id, &q)) {
+        bool has_other = find_control(
+            device, unit == GN_EXPOSURE_US ? V4L2_CID_EXPOSURE : V4L2_CID_EXPOSURE_ABSOLUTE, &q);
+        (void)!refuse(device,
+                      !has_other               ? "no exposure can be set"
+                      : unit == GN_EXPOSURE_US ? "it counts its exposure: no times can be set"
+                                               : "its exposure is set by times, not by counts",
+                      out_error);
+        return -ENOTSUP;
+    }
+    int err = 0;
+    struct v4l2_control c = {.id = held.id};
+    for (size_t i = 0; !err && i < GN_ARRAY_LEN(automatics); i++)
+        err = change(device, &held, automatics[i].id, automatics[i].value, out_error);
+    if (!err && gn_v4l2_device_call(device, VIDIOC_G_CTRL, &c) != 0)
+        c.value = q.minimum; // write-only: nothing to put back
+    else if (!err) {
+        held.noted[held.n_noted].id = held.id;
+        held.noted[held.n_noted++].value = c.value;
+    }
+    if (err) {
+        (void)!gn_v4l2_exposure_restore(device, &held, NULL);
+        return err;
+    }
+    double scale = held.unit_us > 0 ? held.unit_us : 1;
+    *out = (struct gn_exposure){scale * c.value, scale * q.minimum, scale * q.maximum};
+    *exposure = held;
+    return 0;
+}
+
+int gn_v4l2_exposure_set(const struct gn_v4l2_device *device,
+                         const struct gn_v4l2_exposure *exposure, double value, double *out_value,
+                         struct gn_error *out_error)
+{
+    struct v4l2_queryctrl q;
+    double scale = exposure->unit_us > 0 ? exposure->unit_us : 1;
+    const char *unit = exposure->unit_us > 0 ? " us" : "";
+    if (!find_control(device, exposure->id, &q))
+        return gn_error_set(out_error, -EIO, "%s (%s): its exposure cannot be set any more",
+                            device->path, device->card);
+    if (!(value >= scale * (q.minimum - 0.5) && value <= scale * (q.maximum + 0.5)))
+        return gn_error_set(
+            out_error, -ERANGE, "%s (%s): exposure %g%s is not in [%g, %g]%s, which it takes",
+            device->path, device->card, value, unit, scale * q.minimum, scale * q.maximum, unit);
+    struct v4l2_control c = {.id = q.id, .value = (int32_t)lround(value / scale)};
+    int err = gn_v4l2_device_call(device, VIDIOC_S_CTRL, &c);
+    if (err)
+        return gn_error_set(out_error, err, "%s (%s): exposure %g%s cannot be set: %s",
+                            device->path, device->card, value, unit, strerror(-err));
+    (void)gn_v4l2_device_call(device, VIDIOC_G_CTRL, &c); // what it took, where it says
+    *out_value = scale * c.value;
+    return 0;
+}
+
+int gn_v4l2_exposure_restore(const struct gn_v4l2_device *device, struct gn_v4l2_exposure *exposure,
+                             struct gn_error *out_error)
+{
+    int first = 0;
+    while (exposure->n_noted > 0) { // the exposure before its automatic, or it is not taken
+        struct v4l2_queryctrl q;
+        int i = --exposure->n_noted;
+        struct gn_error why = {0};
+        int err = find_control(device, exposure->noted[i].id, &q)
+                      ? set_value(device, &q, exposure->noted[i].value, &why)
+                      : gn_error_set(&why, -EIO, "%s (%s): it does not answer", device->path,
+                                     device->card);
+        if (err && !first)
+            first = gn_error_set(out_error, err, "%s", why.text);
+    }
+    exposure->id = 0;
+    return first;
 }

@@ -47,6 +47,28 @@ GN_MUST_USE int gn_v4l2_device_set_controls(const struct gn_v4l2_device *device,
                                             const struct gn_live_options *options,
                                             struct gn_error *out_error);
 
+/** Exposure set by hand. Caller's memory; zeroed: not held. */
+struct gn_v4l2_exposure {
+    uint32_t id;    // of the control that sets it; 0: not held
+    double unit_us; // of its values; 0: counts
+    int n_noted;
+    struct {
+        uint32_t id;
+        int32_t value;
+    } noted[5]; // what was changed, in order, and what it was
+};
+
+/** As gn_source_hold_exposure, _set_ and _restore_. */
+GN_MUST_USE int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device,
+                                      enum gn_exposure_unit unit, struct gn_v4l2_exposure *exposure,
+                                      struct gn_exposure *out, struct gn_error *out_error);
+GN_MUST_USE int gn_v4l2_exposure_set(const struct gn_v4l2_device *device,
+                                     const struct gn_v4l2_exposure *exposure, double value,
+                                     double *out_value, struct gn_error *out_error);
+GN_MUST_USE int gn_v4l2_exposure_restore(const struct gn_v4l2_device *device,
+                                         struct gn_v4l2_exposure *exposure,
+                                         struct gn_error *out_error);
+
 /** One word of a list that is made for people. */
 typedef void (*gn_v4l2_word_fn)(void *context, const char *word);
 /** Pixel formats: "YUYV". */

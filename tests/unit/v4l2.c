@@ -498,6 +498,78 @@ static void test_mjpeg_passes_as_jpeg(void **state)
     gn_fake_finish(&fake);
 }
 
+static int get_value(struct gn_fake *fake, uint32_t id)
+{
+    return gn_fake_get_control(fake, id)->value;
+}
+
+/* Held by its time: all that is automatic is off meanwhile, and all is as before in the end. */
+static void test_exposure_is_held_and_put_back(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    struct gn_error error = {0};
+    struct gn_exposure range;
+    double took = 0;
+    gn_fake_init(&fake);
+    gn_fake_add_control(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY, "Exposure, Dynamic", 0, 1, 1);
+    gn_fake_add_control(&fake, V4L2_CID_AUTO_WHITE_BALANCE, "White Balance, Automatic", 0, 1, 1);
+    gn_fake_add_control(&fake, V4L2_CID_AUTOGAIN, "Gain, Automatic", 0, 1, 1);
+    gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_ABSOLUTE)->query.step = 5;
+    struct gn_source *source = open_camera(&fake, NULL);
+    assert_int_equal(gn_source_restore_exposure(source, &error), 0); // nothing is held
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_COUNTS, &range, &error), -ENOTSUP);
+    assert_non_null(strstr(error.text, "its exposure is set by times, not by counts"));
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 1);
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error), 0);
+    assert_true(range.now == 25000 && range.least == 300 && range.most == 204700);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_MANUAL);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTO_WHITE_BALANCE), 0);
+    assert_int_equal(gn_source_set_exposure(source, 8710, &took, &error), 0);
+    assert_true(took == 8500); // steps of 500 us: what it took, not what was asked
+    assert_int_equal(gn_source_set_exposure(source, 3e5, &took, &error), -ERANGE);
+    assert_non_null(strstr(error.text, "exposure 300000 us is not in [300, 204700] us"));
+    assert_int_equal(gn_source_restore_exposure(source, &error), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_ABSOLUTE), 250);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_APERTURE_PRIORITY);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY), 1);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 1);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTO_WHITE_BALANCE), 1);
+    fake.is_gone = true;
+    assert_true(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error) < 0);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
+/* A sensor that counts lines; a camera without either. */
+static void test_exposure_by_counts_or_not_at_all(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    struct gn_error error = {0};
+    struct gn_exposure range;
+    double took = 0;
+    gn_fake_init(&fake);
+    struct v4l2_queryctrl *q = &gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_ABSOLUTE)->query;
+    q->id = V4L2_CID_EXPOSURE;
+    struct gn_source *source = open_camera(&fake, NULL);
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error), -ENOTSUP);
+    assert_non_null(strstr(error.text, "it counts its exposure: no times can be set"));
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_COUNTS, &range, &error), 0);
+    assert_true(range.now == 250 && range.least == 3 && range.most == 2047);
+    assert_int_equal(gn_source_set_exposure(source, 100, &took, &error), 0);
+    assert_true(took == 100);
+    assert_int_equal(gn_source_restore_exposure(source, &error), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE), 250);
+    q->flags = V4L2_CTRL_FLAG_READ_ONLY;
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_COUNTS, &range, &error), -ENOTSUP);
+    assert_non_null(strstr(error.text, "no exposure can be set; it has gain"));
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -515,6 +587,8 @@ int main(void)
         cmocka_unit_test(test_drivers_without_end),
         cmocka_unit_test(test_nothing_is_copied_that_need_not_be),
         cmocka_unit_test(test_mjpeg_passes_as_jpeg),
+        cmocka_unit_test(test_exposure_is_held_and_put_back),
+        cmocka_unit_test(test_exposure_by_counts_or_not_at_all),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
