@@ -41,6 +41,9 @@ static const struct {
     {"black", {20.461, -0.079, -0.973}},
 };
 
+/* Half the side of what is measured of a patch; patches are 10/11 of their distance wide. */
+#define HALF 0.27
+
 static const double luminance[3] = {0.2126, 0.7152, 0.0722};
 
 const char *gn_chart_get_name(int patch)
@@ -120,7 +123,7 @@ static void summarise(float *values, int n, double rail, double *out_code, doubl
 static int collect(const struct gn_image *image, const double h[9], const double inverse[9],
                    int patch, int channel, float *values)
 {
-    const double half = 0.27; // of the distance of patches, which are 10/11 of it wide
+    const double half = HALF;
     double column = patch % GN_CHART_COLUMNS, row = patch / GN_CHART_COLUMNS;
     double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9}, p[2];
     for (int i = 0; i < 4; i++) {
@@ -176,44 +179,96 @@ int gn_chart_measure(const struct gn_image *image, const struct gn_chart_place *
     return err;
 }
 
-/* Spearman's rank correlation of 24 pairs; ties in order. */
+void gn_chart_get_outline(const struct gn_chart_place *place, int patch, double out_xy[static 8])
+{
+    static const double ways[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    double h[9], inverse[9];
+    memset(out_xy, 0, 8 * sizeof(*out_xy));
+    if (find_homography(place, h, inverse, NULL) < 0)
+        return;
+    for (int i = 0; i < 4; i++)
+        map_point(h, patch % GN_CHART_COLUMNS + HALF * ways[i][0],
+                  patch / GN_CHART_COLUMNS + HALF * ways[i][1], out_xy + 2 * i);
+}
+
+/* Ranks less their mean; equal values share theirs: clipped patches tell nothing. */
+static void rank(const double values[24], double out[24])
+{
+    for (int i = 0; i < 24; i++) {
+        out[i] = -11.5;
+        for (int j = 0; j < 24; j++)
+            out[i] += values[j] < values[i] ? 1 : values[j] == values[i] && j != i ? 0.5 : 0;
+    }
+}
+
+/* Spearman's rank correlation of 24 pairs. */
 static double correlate_ranks(const double a[24], const double b[24])
 {
-    double sum = 0;
+    double ranks[2][24], ab = 0, aa = 0, bb = 0;
+    rank(a, ranks[0]);
+    rank(b, ranks[1]);
     for (int i = 0; i < 24; i++) {
-        int rank_a = 0, rank_b = 0;
-        for (int j = 0; j < 24; j++) {
-            rank_a += a[j] < a[i] || (a[j] == a[i] && j < i);
-            rank_b += b[j] < b[i] || (b[j] == b[i] && j < i);
-        }
-        sum += (rank_a - rank_b) * (rank_a - rank_b);
+        ab += ranks[0][i] * ranks[1][i];
+        aa += ranks[0][i] * ranks[0][i];
+        bb += ranks[1][i] * ranks[1][i];
     }
-    return 1 - 6 * sum / (24.0 * (24 * 24 - 1));
+    return aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
+}
+
+/* Whether they darken from white to black, but for 2 % of what the patches span. */
+static bool do_greys_fall(const double code[24])
+{
+    double least = code[0], most = code[0];
+    for (int j = 1; j < 24; j++) {
+        least = fmin(least, code[j]);
+        most = fmax(most, code[j]);
+    }
+    for (int j = GN_CHART_WHITE + 1; j < 24; j++)
+        if (code[j] > code[j - 1] + 0.02 * (most - least))
+            return false;
+    return true;
+}
+
+double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place,
+                             bool *out_greys_fall)
+{
+    struct gn_chart_patch measured[24];
+    double expected[4][24], best = -1;
+    if (gn_chart_measure(image, place, 0, measured, NULL) < 0)
+        return -1;
+    for (int j = 0; j < 24; j++) {
+        double rgb[3];
+        gn_chart_get_reflectance(j, rgb);
+        for (int c = 0; c < 3; c++)
+            expected[c][j] = rgb[c];
+        expected[3][j] = luminance[0] * rgb[0] + luminance[1] * rgb[1] + luminance[2] * rgb[2];
+    }
+    for (int i = 0; i < 4 * image->channels; i++) {
+        double code[24]; // ranks: any response that rises keeps them
+        for (int j = 0; j < 24; j++)
+            code[j] = measured[j].code[i / 4];
+        double likeness = correlate_ranks(code, expected[i % 4]);
+        if (likeness > best) {
+            best = likeness;
+            if (out_greys_fall)
+                *out_greys_fall = do_greys_fall(code);
+        }
+    }
+    return best;
 }
 
 double gn_chart_orient(const struct gn_image *image, struct gn_chart_place *place)
 {
     static const int ways[4][4] = {{0, 1, 2, 3}, {2, 3, 0, 1}, {1, 0, 3, 2}, {3, 2, 1, 0}};
     struct gn_chart_place best_place = *place;
-    double best = -1, expected[24];
-    for (int j = 0; j < 24; j++) {
-        double rgb[3];
-        gn_chart_get_reflectance(j, rgb);
-        expected[j] = luminance[0] * rgb[0] + luminance[1] * rgb[1] + luminance[2] * rgb[2];
-    }
+    double best = -1;
     for (int w = 0; w < 4; w++) {
         struct gn_chart_place tried;
-        struct gn_chart_patch measured[24];
-        double code[24];
         for (int i = 0; i < 4; i++)
             memcpy(tried.corners + 2 * i, place->corners + 2 * ways[w][i], 2 * sizeof(double));
-        if (gn_chart_measure(image, &tried, 0, measured, NULL) < 0)
-            return -1;
-        for (int j = 0; j < 24; j++)
-            code[j] = measured[j].code[1]; // ranks: any response that rises keeps them
-        double correlation = correlate_ranks(code, expected);
-        if (correlation > best) {
-            best = correlation;
+        double likeness = gn_chart_get_likeness(image, &tried, NULL);
+        if (likeness > best) {
+            best = likeness;
             best_place = tried;
         }
     }

@@ -53,10 +53,22 @@ GN_MUST_USE int gn_chart_measure(const struct gn_image *image, const struct gn_c
                                  double rail, struct gn_chart_patch out_patches[static 24],
                                  struct gn_error *out_error);
 
+/** The corners of what gn_chart_measure measures of a patch, px: x0 y0 x1 y1 ... in turn. */
+void gn_chart_get_outline(const struct gn_chart_place *place, int patch, double out_xy[static 8]);
+
 /**
- * Which of the chart's four ways to lie (turned by 180 degrees, mirrored) fits what was measured
- * best, by the rank correlation of green codes and luminance; *place becomes that. Returns the
- * correlation, 1 at best; below 0.8 it is no such chart.
+ * How like the chart what lies at a place is: the rank correlation (Spearman's) of the codes of a
+ * channel with the patches' luminance or reflectance in red, green or blue, where it is best: light
+ * of one band does as well as white, and a channel that is clipped does no harm. 1 at best, below
+ * 0.8 it is no such chart; -1 where it cannot be measured. out_greys_fall (may be NULL): whether
+ * the greys darken from white to black there, within 2 % of the patches' span.
+ */
+double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place,
+                             bool *out_greys_fall);
+
+/**
+ * Which of the chart's four ways to lie (turned by 180 degrees, mirrored) is most like it; *place
+ * becomes that. Returns the likeness.
  */
 double gn_chart_orient(const struct gn_image *image, struct gn_chart_place *place);
 
