@@ -127,8 +127,7 @@ int gn_calibrate_stretch_gray(const struct gn_image *image, struct gn_image8 *ou
     return stretch(image, 1, out_image);
 }
 
-/* One number or fraction at *at, which moves on. False where there is none. */
-static bool take_number(char **at, double *out)
+bool gn_calibrate_take_number(const char **at, double *out)
 {
     char *end = NULL;
     double value = strtod(*at, &end);
@@ -159,12 +158,12 @@ int gn_calibrate_read_numbers(const char *option, const char *text, int n, int c
     } else if (!(list = strdup(text))) {
         return gn_error_set(out_error, -ENOMEM, "out of memory");
     }
-    for (char *at = list; *at;) {
+    for (const char *at = list; *at;) {
         if (*at == '#') {
             at += strcspn(at, "\n");
         } else if (isspace((unsigned char)*at) || *at == ',') {
             at++;
-        } else if (count >= capacity || !take_number(&at, &out_values[count])) {
+        } else if (count >= capacity || !gn_calibrate_take_number(&at, &out_values[count])) {
             count = gn_error_set(out_error, -EINVAL,
                                  "--%s: number %d is none, or one too many; right would be up to "
                                  "%d numbers as 0.5,1/60,2 or a file with them",

@@ -7,6 +7,8 @@
 #ifndef GN_CLIENT_CALIBRATE_INPUT_H
 #define GN_CLIENT_CALIBRATE_INPUT_H
 
+#include <stdbool.h>
+
 #include "client/capture/file.h"
 #include "client/vision/boards.h"
 #include "common/error.h"
@@ -54,6 +56,9 @@ GN_MUST_USE int gn_calibrate_stretch_gray(const struct gn_image *image,
 /** Sets columns and rows from "10x7", text of --board. Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_calibrate_parse_board(const char *text, struct gn_board *board,
                                          struct gn_error *out_error);
+
+/** One number or fraction, as 1/60, at *at, which moves on. False where there is none. */
+bool gn_calibrate_take_number(const char **at, double *out);
 
 /**
  * Numbers separated by commas or white space, fractions as 1/60; text is the list itself or the

@@ -61,9 +61,10 @@ static int decode(const struct gn_capture *capture, struct gn_image8 *out,
     return err;
 }
 
-static int convert(const struct gn_capture *capture, struct gn_image_file *out, int *out_full_scale,
-                   struct gn_error *out_error)
+int gn_calibrate_decode(const struct gn_capture *capture, struct gn_image_file *out,
+                        int *out_full_scale, struct gn_error *out_error)
 {
+    memset(out, 0, sizeof(*out));
     const size_t values = (size_t)capture->width * (size_t)capture->height;
     bool is_12 = false;
     int channels = 3, err = 0;
@@ -96,22 +97,29 @@ static int convert(const struct gn_capture *capture, struct gn_image_file *out, 
     return err ? gn_error_set(out_error, err, "out of memory") : 0;
 }
 
+int gn_calibrate_wait(const struct gn_program *program, struct gn_source *source,
+                      struct gn_capture *out, struct gn_error *out_error)
+{
+    int got = -EAGAIN;
+    while (got == -EAGAIN) {
+        if (gn_cmd_is_interrupted())
+            return 0;
+        got = gn_source_read(source, out, out_error);
+        if (got == -EAGAIN && out_error->text[0])
+            gn_cmd_fail(program, out_error->text);
+    }
+    return got;
+}
+
 int gn_calibrate_take(const struct gn_program *program, struct gn_source *source,
                       struct gn_image_file *out, int *out_full_scale, struct gn_error *out_error)
 {
     struct gn_capture capture;
-    int got = -EAGAIN;
     memset(out, 0, sizeof(*out));
-    while (got == -EAGAIN) {
-        if (gn_cmd_is_interrupted())
-            return 0;
-        got = gn_source_read(source, &capture, out_error);
-        if (got == -EAGAIN && out_error->text[0])
-            gn_cmd_fail(program, out_error->text);
-    }
+    int got = gn_calibrate_wait(program, source, &capture, out_error);
     if (got != 1)
         return got;
-    int err = convert(&capture, out, out_full_scale, out_error);
+    int err = gn_calibrate_decode(&capture, out, out_full_scale, out_error);
     if (err)
         gn_image_file_finish(out);
     return err ? err : 1;

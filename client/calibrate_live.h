@@ -32,6 +32,18 @@ GN_MUST_USE int gn_calibrate_open(const struct gn_options *options,
                                   struct gn_source **out_source, struct gn_error *out_error);
 
 /**
+ * Waits for the next picture as it is captured; news of the camera go to stderr. Returns 1, 0 at
+ * the end of a video or on Ctrl-C (see gn_cmd_catch_signals), or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_calibrate_wait(const struct gn_program *program, struct gn_source *source,
+                                  struct gn_capture *out, struct gn_error *out_error);
+
+/** A capture's codes. *out_full_scale: the largest code of 16-bit pictures, untouched by others.
+ * The caller finishes *out. Returns 0, or a negative errno and a sentence. */
+GN_MUST_USE int gn_calibrate_decode(const struct gn_capture *capture, struct gn_image_file *out,
+                                    int *out_full_scale, struct gn_error *out_error);
+
+/**
  * Waits for the next picture; news of the camera go to stderr. *out_full_scale: the largest code of
  * 16-bit pictures. The caller finishes *out. Returns 1, 0 at the end of a video or on Ctrl-C (see
  * gn_cmd_catch_signals), or a negative errno and a sentence.

@@ -13,19 +13,12 @@ import struct
 import subprocess
 import sys
 
+from chart import CHART
 from folder import Folder
-from pictures import png_bytes
+from pictures import png_bytes, read_png
 
 GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[1]
 DATA = os.environ.get('GNOMON_DATA')
-# Linear Rec.709 of the chart's patches, from ArgyllCMS's ColorChecker.cie (tests/unit/chart_response.c).
-CHART = [
-    (.1731, .0821, .0567), (.5683, .2927, .2183), (.1037, .1959, .3315), (.1016, .1489, .0519),
-    (.2216, .2158, .4346), (.1081, .5144, .4127), (.7473, .2006, .0281), (.0576, .1052, .4029),
-    (.5667, .0842, .1197), (.1110, .0423, .1430), (.3454, .5087, .0494), (.7945, .3594, .0205),
-    (.0171, .0502, .2923), (.0560, .3002, .0687), (.4558, .0303, .0409), (.8572, .5675, .0068),
-    (.5336, .0886, .3075), (0, .2470, .4005), (.9126, .9150, .8936), (.5798, .5921, .5934),
-    (.3550, .3655, .3676), (.1901, .1919, .1931), (.0853, .0889, .0926), (.0303, .0311, .0327)]
 PATCH, GAP, BORDER = 90, 9, 60
 A, B, C = 0.6, 0.07, 2e-4
 
@@ -143,7 +136,6 @@ def check_chart():
 
 
 def check_chart_found():
-    need_opencv()
     with Folder() as f:
         write_charts(f, [1, .1, 10])
         out = succeed('response', '--chart', f.at('chart*.png'), '--times', '1,.1,10', '--full-scale', 4095,
@@ -272,7 +264,7 @@ def check_ball():
 
 
 def read_tiff(path):
-    """Width, height and bytes of an 8-bit gray TIFF of PackBits strips (TIFF 6.0, section 9)."""
+    """Width, height and bytes of an 8-bit TIFF of PackBits strips (TIFF 6.0, section 9)."""
     data = open(path, 'rb').read()
     assert data[:4] == b'II*\0', path
     at = struct.unpack_from('<I', data, 4)[0]
@@ -283,7 +275,7 @@ def read_tiff(path):
         if size:
             where = value if n * size > 4 else at + 2 + 12 * i + 8
             tags[tag] = struct.unpack_from('<%d%s' % (n, 'H' if size == 2 else 'I'), data, where)
-    assert tags[258] == (8,) and tags[259] == (32773,), path
+    assert set(tags[258]) == {8} and tags[259] == (32773,), path
     out = bytearray()
     for offset, count in zip(tags[273], tags[279]):
         i = offset
@@ -296,6 +288,14 @@ def read_tiff(path):
                 out += data[i + 1:i + 2] * (257 - n) if n > 128 else b''
                 i += 2 if n > 128 else 1
     return tags[256][0], tags[257][0], bytes(out)
+
+
+def check_found(out, bound):
+    """The chart of these photographs, against its patches' centres read off the pictures."""
+    found = [float(x) for x in re.search(r'--corners ([\d.,]+)', out).group(1).split(',')]
+    off = max(abs(a - b) for a, b in zip(found, (59, 57, 352, 58, 334, 224, 75, 218)))
+    print('# the chart\'s corner patches found within %.1f px' % off)
+    assert off < bound, (found, out)
 
 
 def check_raw_photographs():
@@ -312,8 +312,8 @@ def check_raw_photographs():
                 f.write('shot%d.png' % len(times), png_bytes(width, height, pixels, 1))
             assert len(times) == 7, paths
             out = succeed('response', '--chart', f.at('shot*.png'), '--times', ','.join(times), '--model',
-                          'linear', '--bayer', 'gbrg', '--no-matrix', '--corners',
-                          '59,56,353,57,332,225,75,218', '--out', f.at('camera.json'))
+                          'linear', '--bayer', 'gbrg', '--no-matrix', '--out', f.at('camera.json'))
+            check_found(out, 6)
             errors = [(float(e), int(n)) for e, n in
                       re.findall(r'error ([\d.]+) % RMS over (\d+) sure', out)]
             print('# %d nm, %s ms: errors %s %%' % (band, ' '.join(times),
@@ -321,6 +321,24 @@ def check_raw_photographs():
             assert len(errors) == 7 and all(e < 3 and n >= 5 for e, n in errors), out
             table = json.load(open(f.at('camera.json')))['response']['table']
             assert len(table) == 4096 and table[-1] > 0
+            # Each alone shows the chart, from nearly black to nearly white.
+            for i in range(len(times)):
+                refuse('one exposure alone', 'response', '--chart', f.at('shot%d.png' % (i + 1)), '--bayer',
+                       'gbrg', '--no-matrix', '--out', f.at('x.json'))
+
+
+def check_photograph_in_colour():
+    """The same chart under white light."""
+    if not DATA:
+        raise Skip('GNOMON_DATA is unset')
+    with Folder() as f:
+        width, height, pixels = read_tiff(os.path.join(DATA, 'colorchecker', 'd2_colorChecker30cm_d3_wb.tif'))
+        f.write('shot.png', png_bytes(width, height, pixels, 3))
+        status, out, err = calibrate('response', '--chart', f.at('shot.png'), '--out', f.at('x.json'),
+                                     '--picture', f.at('found.png'))
+        assert status == 1 and 'one exposure alone' in err, (status, out, err)
+        check_found(out, 6)
+        assert read_png(f.at('found.png'))[:2] == (width, height)
 
 
 def check_published_intrinsics():
@@ -362,7 +380,7 @@ def check_refusals():
         refuse('10x7', 'intrinsics', '--files', f.at('a.png'), '--board', '10by7', '--out', f.at('x.json'))
         refuse('the first picture is 64 x 48', 'intrinsics', '--files', f.at('*.png'), '--board', '10x7',
                '--out', f.at('x.json'))
-        refuse('no picture shows a colour chart', 'response', '--chart', f.at('a.png'), '--out',
+        refuse('the pictures show no colour chart', 'response', '--chart', f.at('a.png'), '--out',
                f.at('x.json'))
         status, _, err = calibrate('respose')
         assert status == 2 and "did you mean 'response'" in err, err
@@ -371,7 +389,7 @@ def check_refusals():
 
 def main():
     tests = [check_chart, check_chart_found, check_stack, check_probe, check_ball, check_raw_photographs,
-             check_published_intrinsics, check_refusals]
+             check_photograph_in_colour, check_published_intrinsics, check_refusals]
     print('1..%d' % len(tests))
     failed = 0
     for n, test in enumerate(tests, 1):

@@ -9,12 +9,14 @@ import math
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 import own_network  # noqa: E402
+from chart import CHART  # noqa: E402
 from folder import Folder  # noqa: E402
 from pictures import png_bytes, read_png  # noqa: E402
 
@@ -32,10 +34,10 @@ VIEWS = [(.5, 0, 0, 0, 11), (-.5, .1, -1.4, -.8, 11), (0, .5, 1.4, 1, 11), (.1, 
 class Camera:
     """Serves the folder's pictures that match, each for step_s, in turn."""
 
-    def __init__(self, pattern, step_s, width=WIDTH, height=HEIGHT):
+    def __init__(self, pattern, step_s, *more, width=WIDTH, height=HEIGHT):
         self.process = subprocess.Popen(
             [FAKE, '--width', str(width), '--height', str(height), '--files', pattern, '--step-s',
-             str(step_s)], stdout=subprocess.PIPE, text=True)
+             str(step_s), *more], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout.readline() == 'ready\n', 'the camera does not start'
 
     def __enter__(self):
@@ -43,7 +45,11 @@ class Camera:
 
     def __exit__(self, *_):
         self.process.terminate()
-        self.process.communicate()
+        self.said, _ = self.process.communicate()
+
+    def get_settings(self):
+        """Exposure, us, and automatic gain (1: off, 2: continuous) when it ended."""
+        return tuple(map(int, re.search(r'exposure of (\d+) us, automatic gain (\d)', self.said).groups()))
 
 
 def read_end(err):
@@ -133,12 +139,12 @@ def test_intrinsics():
             assert 'pictures are there already' in err, err
 
 
-def interrupt_at(view, arguments):
-    """Ctrl-C when that view is there."""
+def interrupt_at(start, arguments):
+    """Ctrl-C at the line that begins so."""
     process = subprocess.Popen([GNOMON, 'calibrate', *map(str, arguments)], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     for line in process.stdout:
-        if line.startswith('view %d of ' % view):
+        if line.startswith(start):
             break
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
@@ -151,7 +157,7 @@ def test_interrupt():
         with Folder() as f:
             with Camera(SHOTS.at('a*.png'), .4):
                 for _ in range(TRIES):
-                    process, err = interrupt_at(wanted, intrinsics(f, '--views', 9))
+                    process, err = interrupt_at('view %d of ' % wanted, intrinsics(f, '--views', 9))
                     if NO_ANSWER not in err:
                         break
             assert process.returncode == status, (process.returncode, err)
@@ -184,6 +190,107 @@ def test_probe():
         assert '--frames is for cameras' in err, err
 
 
+def light_picture(color):
+    """16 bits, color(x, y) R, G, B, full scale 1 at the camera's 10 ms."""
+    return png_bytes(WIDTH, HEIGHT, b''.join(struct.pack('>3H', *(round(65535 * v) for v in color(x, y)))
+                                             for y in range(HEIGHT) for x in range(WIDTH)), 3, 16)
+
+
+def draw_chart(x, y):
+    u, v = (x + .5 - 12) / 36, (y + .5 - 18) / 36
+    if 0 <= u < 6 and 0 <= v < 4 and abs(u % 1 - .5) < .45 and abs(v % 1 - .5) < .45:
+        return CHART[6 * int(v) + int(u)]
+    return .03, .03, .03
+
+
+A, B, C = .55, .05, 2e-4
+CURVE = ['--response', 'log:%g,%g,%g' % (A, B, C), '--noise', '2']
+
+
+def response(folder, *more, pixels='RGB12'):
+    return ['response', '--gige', '127.0.0.1', '--frame-rate', 100, '--pixel-format', pixels, '--out',
+            folder.at('probe.json'), *more]
+
+
+def find_worst(path, decades):
+    """The written curve against the camera's, light decades about 1."""
+    r = read_camera(path)['response']
+    worst = 0
+    for i in range(-100, 101):
+        x = 10 ** (decades / 2 * i / 100)
+        found = math.exp((A + B * math.log(C + x) - r['a']) / r['b']) - r['c']
+        worst = max(worst, abs(found / x - 1))
+    return worst
+
+
+def test_chart():
+    """A log sensor from 10 us to 10 s; its settings are back, and what was saved says the same."""
+    with Folder() as f:
+        f.write('light.png', light_picture(draw_chart))
+        with Camera(f.at('light.png'), 0, '--chunks', *CURVE) as camera:
+            out = run(*response(f, '--exposures', '10,.01,.1,1,100,1000,10000ms', '--controls',
+                                'GainAuto=Continuous', '--save', f.at('shots')))
+        assert camera.get_settings() == (10000, 2), camera.said
+        times = re.findall(r'^exposure (\d) of 7: (\S+) us: mean of 8, noise ([\d.]+) codes of 4095', out, re.M)
+        assert [float(t) for _, t, _ in times] == [1e4, 10, 100, 1e3, 1e5, 1e6, 1e7], out
+        # Codes are cut to whole ones: 1/12 more.
+        assert all(abs(float(noise) - math.sqrt(4 + 1 / 12)) < .05 for _, _, noise in times), out
+        worst = [find_worst(f.at('probe.json'), decades) for decades in (4, 6)]
+        print('# log curve: worst %.2f %% of four decades, %.2f %% of six' % tuple(100 * w for w in worst))
+        assert worst[0] < .03 and worst[1] < .08, worst
+        again = re.search(r'again by (.*)$', out, re.M).group(1).replace("'", '').split()
+        run('response', *again, '--out', f.at('again.json'))
+        assert read_camera(f.at('again.json')) == read_camera(f.at('probe.json'))
+
+
+def test_stack():
+    """An 8-bit camera that does not say what exposure a picture has; exposures of its own choice."""
+    with Folder() as f:
+        f.write('light.png', light_picture(lambda x, y: 3 * (min(.0004 * 1.033 ** x * (1 + y / 400), 1),)))
+        with Camera(f.at('light.png'), 0, '--response', 'srgb') as camera:
+            out = run(*response(f, '--live', 'stack', '--exposures', 'auto', '--frames', 2,
+                                pixels='RGB8'))
+        assert camera.get_settings()[0] == 10000, camera.said
+        times = [float(t) for t in re.findall(r'^(\S+) us: mean of 2.*clipped$', out, re.M)]
+        assert times[0] == 1e4 and all(b == 2 * a for a, b in zip(times[1:], times[2:])), out
+        assert 'too dark, left out' in out and times[1] < 1e3 and 1e4 < times[-1] < 1e6, times
+        table = read_camera(f.at('probe.json'))['response']['table']
+        # The camera cuts its 12 bits to 8: a code stands for the middle of 16 of them.
+        true = [(((16 * z + 7.5) / 4095 + .055) / 1.055) ** 2.4 for z in range(256)]
+        worst = max(abs(table[z] / table[128] * true[128] / true[z] - 1) for z in range(15, 246))
+        print('# table against sRGB, worst %.2f %% of codes 15 to 245' % (100 * worst))
+        assert len(table) == 256 and worst < .03
+
+
+def test_response_ends():
+    """Ctrl-C, and exposures that cannot be: the camera's settings are back, nothing is written."""
+    with Folder() as f:
+        f.write('light.png', light_picture(draw_chart))
+        with Camera(f.at('light.png'), 0, '--chunks', *CURVE) as camera:
+            for _ in range(TRIES):
+                process, err = interrupt_at('exposure 2 of 3', response(
+                    f, '--exposures', '10,20,40ms', '--frames', 50, '--controls', 'GainAuto=Continuous'))
+                if NO_ANSWER not in err:
+                    break
+            assert process.returncode == 1 and 'interrupted after' in read_end(err), (process.returncode, err)
+            for exposures, words in (('10,20000ms', '2e+07 us is not in [10, 1e+07] us'),
+                                     ('1,2,4', 'its exposure is set by times, not by counts'),
+                                     ('1ms,2', 'as 1,2,4,8ms'), ('1,2parsecs', 'as 1,2,4,8ms'),
+                                     ('0ms', 'as 1,2,4,8ms'), (',', 'as 1,2,4,8ms')):
+                err = run(*response(f, '--exposures', exposures), status=1)
+                assert words in err, (exposures, err)
+        assert camera.get_settings() == (10000, 2), camera.said
+        for more, words in (([], 'a camera needs --exposures'),
+                            (['--exposures', '1ms', '--times', '1'], 'no --times'),
+                            (['--exposures', '1ms', '--chart', 'x'], 'one of them'),
+                            (['--exposures', '1ms', '--bayer', 'rggb'], '--bayer is for files')):
+            err = run(*response(f, *more), status=1)
+            assert words in err, (more, err)
+        err = run('response', '--chart', 'x', '--save', 'y', '--out', f.at('probe.json'), status=1)
+        assert '--save are for cameras' in err, err
+        assert os.listdir(f.path) == ['light.png']
+
+
 def test_misuse():
     """Sources that are none, several, or not for this."""
     with Folder() as f:
@@ -198,7 +305,8 @@ def test_misuse():
 
 
 def main():
-    tests = [test_intrinsics, test_interrupt, test_probe, test_misuse]
+    tests = [test_intrinsics, test_interrupt, test_probe, test_chart, test_stack, test_response_ends,
+             test_misuse]
     print('1..%d' % len(tests))
     failed = 0
     for number, test in enumerate(tests, 1):

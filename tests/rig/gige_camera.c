@@ -24,7 +24,9 @@
 #include "common/clock.h"
 #include "common/image_file.h"
 #include "common/options.h"
+#include "common/response.h"
 #include "proto/attr.h"
+#include "tests/random.h"
 #include "tests/rig/gige_genicam.h"
 #include "tests/rig/gige_picture.h"
 
@@ -99,6 +101,20 @@ static const struct gn_option option_table[] = {
      .max = 1000,
      .default_value = "0",
      .help = "How long each file is served; 0: one picture each."},
+    {.key = "response",
+     .flag = "response",
+     .type = GN_OPTION_STRING,
+     .value_name = "CURVE",
+     .help = "The files are light, full scale 1 at an exposure of 10 ms, and what is sent are its "
+             "codes at the exposure set: log:A,B,C (code = A + B ln(C + light)), srgb or linear. "
+             "An exposure holds from the second picture after it was set on."},
+    {.key = "noise",
+     .flag = "noise",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0,
+     .max = 100,
+     .default_value = "0",
+     .help = "Deviation of the codes, of 4095, with --response."},
     {.key = "loss",
      .flag = "loss",
      .type = GN_OPTION_DOUBLE,
@@ -156,10 +172,15 @@ struct frame {
 struct camera {
     ArvFakeCamera *fake;
     enum fault fault;
-    double loss, step_s, delay_ms;
+    double loss, step_s, delay_ms, noise;
     bool can_resend, has_chunks;
     int n_files;
     struct gn_image16 *files;
+    bool has_response;
+    struct gn_response response;
+    struct gn_image16 exposed; // what the response makes of a file
+    uint32_t exposure_us[2];   // of the next picture, and of the one after
+    uint64_t random;
     int control, stream; // sockets
     struct sockaddr_in to;
     struct sockaddr_in controller; // port 0: nobody
@@ -247,9 +268,43 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
 
 static void answer_waiting(struct camera *c, int timeout_ms);
 
+/** "log:0.6,0.07,0", "srgb", "linear". */
+static int read_response(const char *text, struct gn_response *out, struct gn_error *error)
+{
+    char name[16] = "", rest;
+    int n =
+        sscanf(text, "%15[a-z]:%lf,%lf,%lf%c", name, &out->log_a, &out->log_b, &out->log_c, &rest);
+    const char *reason = "no such curve";
+    if (gn_response_from_name(name, &out->type) < 0 ||
+        n != (out->type == GN_RESPONSE_LOG ? 4 : 1) || gn_response_check(out, &reason) < 0)
+        return gn_error_set(error, -EINVAL, "--response %s: %s", text, reason);
+    return 0;
+}
+
+/** The codes of a file's light at the exposure that holds now. */
+static const struct gn_image16 *expose(struct camera *c, const struct gn_image16 *light)
+{
+    struct gn_image16 *out = &c->exposed;
+    double scale = c->exposure_us[0] / (65535.0 * ARV_FAKE_CAMERA_EXPOSURE_TIME_US_DEFAULT);
+    size_t n = (size_t)light->width * (size_t)light->height * (size_t)light->channels;
+    if (out->channels != light->channels) {
+        gn_image16_finish(out);
+        if (gn_image16_init(out, light->width, light->height, light->channels) < 0)
+            return NULL;
+    }
+    for (size_t i = 0; i < n; i++) {
+        float code = gn_response_encode(&c->response, (float)(light->data[i] * scale));
+        double noise = c->noise > 0 ? c->noise * gn_test_random_normal(&c->random) : 0;
+        out->data[i] = (uint16_t)lround(fmin(fmax(4095 * (double)code + noise, 0), 4095));
+    }
+    c->exposure_us[0] = c->exposure_us[1];
+    c->exposure_us[1] = read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+    return out;
+}
+
 /** What follows a picture of n bytes: each chunk's data, its id, its length; the picture's first.
  */
-static void put_chunks(uint8_t *out, uint32_t n, uint64_t time_ns)
+static void put_chunks(uint8_t *out, uint32_t n, uint64_t time_ns, uint32_t exposure_us)
 {
     put32(out, 1);
     put32(out + 4, n);
@@ -257,6 +312,13 @@ static void put_chunks(uint8_t *out, uint32_t n, uint64_t time_ns)
     put32(out + 12, (uint32_t)time_ns);
     put32(out + 16, GN_GIGE_CHUNK_ID);
     put32(out + 20, 8);
+    double exposure = exposure_us;
+    uint64_t bits;
+    memcpy(&bits, &exposure, sizeof(bits));
+    put32(out + 24, (uint32_t)(bits >> 32));
+    put32(out + 28, (uint32_t)bits);
+    put32(out + 32, GN_GIGE_CHUNK_ID_EXPOSURE);
+    put32(out + 36, 8);
 }
 
 /** Takes the picture and sends it. */
@@ -288,9 +350,14 @@ static void send_frame(struct camera *c)
     double now_s = (double)(gn_clock_get_monotonic_ns() - c->begin_ns) * 1e-9;
     uint64_t k = c->step_s > 0 ? (uint64_t)(now_s / c->step_s) : c->n_frames;
     const struct gn_image16 *picture = c->n_files ? &c->files[k % (uint64_t)c->n_files] : NULL;
+    uint32_t exposure_us = c->has_response
+                               ? c->exposure_us[0]
+                               : read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+    if (picture && c->has_response)
+        picture = expose(c, picture);
     gn_gige_pack(format, picture, c->n_frames, width, height, f->data);
     if (has_chunks)
-        put_chunks(f->data + n_bytes, (uint32_t)n_bytes, time_ns);
+        put_chunks(f->data + n_bytes, (uint32_t)n_bytes, time_ns, exposure_us);
     if (c->fault == FAULT_CODES)
         f->data[n_bytes - 1] = 0xff;
     f->n_sent = c->fault == FAULT_TRUNCATED ? f->n_bytes / 2 : f->n_bytes;
@@ -443,6 +510,9 @@ static void run(struct camera *c)
     }
     printf("%llu frames, %lu packets, %lu lost, %lu requests, %lu sent again\n",
            (unsigned long long)c->n_frames, c->n_packets, c->n_dropped, c->n_asked, c->n_resent);
+    printf("set to an exposure of %u us, automatic gain %u\n",
+           read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US),
+           read_register(c, ARV_FAKE_CAMERA_REGISTER_GAIN_MODE));
 }
 
 /** Reads the pictures to serve; all must have the camera's size. */
@@ -470,8 +540,10 @@ static int read_files(struct camera *c, const char *pattern, int width, int heig
             err = gn_image16_init(&c->files[i], width, height, image->channels);
         size_t n = (size_t)width * (size_t)height * (size_t)image->channels;
         for (size_t k = 0; k < n && !err; k++)
-            c->files[i].data[k] =
-                is_8 ? (uint16_t)((file.codes8.data[k] * 4095 + 127) / 255) : file.codes16.data[k];
+            c->files[i].data[k] = !is_8 ? file.codes16.data[k]
+                                  : c->has_response
+                                      ? (uint16_t)(file.codes8.data[k] * 257)
+                                      : (uint16_t)((file.codes8.data[k] * 4095 + 127) / 255);
         gn_image_file_finish(&file);
         c->n_files += !err;
     }
@@ -552,6 +624,8 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     c.delay_ms = gn_options_get_double(options, NULL, NULL, "delay-ms");
     c.has_chunks = gn_options_get_bool(options, NULL, NULL, "chunks");
     c.can_resend = !gn_options_get_bool(options, NULL, NULL, "no-resend");
+    c.noise = gn_options_get_double(options, NULL, NULL, "noise");
+    c.exposure_us[0] = c.exposure_us[1] = (uint32_t)ARV_FAKE_CAMERA_EXPOSURE_TIME_US_DEFAULT;
     c.begin_ns = gn_clock_get_monotonic_ns();
     arv_fake_camera_write_register(c.fake, REG_VERSION, 0x00010002);
     arv_fake_camera_write_register(c.fake, REG_CAPABILITY,
@@ -559,7 +633,11 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     arv_fake_camera_write_register(c.fake, ARV_FAKE_CAMERA_REGISTER_WIDTH,
                                    c.fault == FAULT_HUGE ? 0x7ffffff0 : (uint32_t)width);
     arv_fake_camera_write_register(c.fake, ARV_FAKE_CAMERA_REGISTER_HEIGHT, (uint32_t)height);
-    int err = open_sockets(&c, gn_options_get_string(options, NULL, NULL, "address"), error);
+    const char *response = gn_options_get_string(options, NULL, NULL, "response");
+    c.has_response = response != NULL;
+    int err = response ? read_response(response, &c.response, error) : 0;
+    if (!err)
+        err = open_sockets(&c, gn_options_get_string(options, NULL, NULL, "address"), error);
     if (!err && pattern)
         err = read_files(&c, pattern, width, height, error);
     if (!err) {
@@ -572,6 +650,7 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     for (int i = 0; i < c.n_files; i++)
         gn_image16_finish(&c.files[i]);
     free(c.files);
+    gn_image16_finish(&c.exposed);
     g_object_unref(c.fake);
     return err;
 }

@@ -20,14 +20,20 @@
 static const char chunk_nodes[] =
     "<Boolean Name=\"ChunkModeActive\"><pValue>ChunkModeReg</pValue></Boolean>"
     "<Enumeration Name=\"ChunkSelector\"><EnumEntry Name=\"Timestamp\"><Value>1</Value>"
-    "</EnumEntry><pValue>ChunkSelectorReg</pValue></Enumeration>"
+    "</EnumEntry><EnumEntry "
+    "Name=\"ExposureTime\"><Value>2</Value></EnumEntry><pValue>ChunkSelectorReg</pValue></"
+    "Enumeration>"
     "<Boolean Name=\"ChunkEnable\"><pValue>ChunkEnableReg</pValue></Boolean>" REGISTER(
         "ChunkModeReg", "0x380") REGISTER("ChunkSelectorReg", "0x384")
         REGISTER("ChunkEnableReg",
                  "0x388") "<Port Name=\"ChunkPort\"><ChunkID>10</ChunkID></Port>"
                           "<IntReg Name=\"ChunkTimestamp\"><Address>0</Address><Length>8</Length>"
                           "<AccessMode>RO</AccessMode><pPort>ChunkPort</"
-                          "pPort><Endianess>BigEndian</Endianess></IntReg>";
+                          "pPort><Endianess>BigEndian</Endianess></IntReg>"
+                          "<Port Name=\"ExposurePort\"><ChunkID>11</ChunkID></Port>"
+                          "<FloatReg Name=\"ChunkExposureTime\"><Address>0</Address>"
+                          "<Length>8</Length><AccessMode>RO</AccessMode>"
+                          "<pPort>ExposurePort</pPort><Endianess>BigEndian</Endianess></FloatReg>";
 
 /** Inserts before the first `mark`. Whether it was there. */
 static bool insert(GString *text, const char *mark, const char *what)
@@ -57,7 +63,7 @@ static bool extend(GString *text)
     is_good = is_good && insert(text, payload, variable);
     const char *formula = strstr(text->str, payload);
     if (formula)
-        g_string_insert(text, formula - text->str + (gssize)strlen(payload), " + 24 * CHUNKS");
+        g_string_insert(text, formula - text->str + (gssize)strlen(payload), " + 40 * CHUNKS");
     return is_good && insert(text, "</RegisterDescription>", chunk_nodes);
 }
 

@@ -1,0 +1,451 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * A series of exposures of a camera: each set, waited for, and averaged.
+ */
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/calibrate_live.h"
+#include "client/calibrate_series.h"
+#include "client/cmd.h"
+#include "common/clock.h"
+#include "common/file.h"
+
+#define DEFAULT_FRAMES 8
+/* Sensors take a new exposure one to three pictures after it was set, and do not all say when. */
+#define SETTLING 4
+/* Pictures after which one with the exposure that was set must have come, where the camera says
+ * what each has; and how far off what it says may be. */
+#define MAX_WAIT 50
+#define SAME_EXPOSURE 0.005
+/* --exposures auto: none longer; a picture tells something from this span of codes on; the end. */
+#define AUTO_MOST_US 1e6
+#define AUTO_SPAN 0.03
+#define AUTO_CLIPPED 0.5
+/* Codes from this share of full scale on are clipped. */
+#define BRIGHT_RAIL 0.99
+/* All pictures of a series, bytes. */
+#define MAX_BYTES ((size_t)2 << 30)
+
+/* What is to be taken. */
+struct plan {
+    enum gn_exposure_unit unit;
+    bool is_auto;
+    int n;
+    double values[GN_SERIES_MAX];
+};
+
+/* A series under way. */
+struct work {
+    struct gn_calibrate_series *series;
+    const struct gn_program *program;
+    struct gn_source *source;
+    enum gn_exposure_unit unit;
+    const char *folder; // where pictures are written; NULL: nowhere
+    int n_frames;
+    int full_scale; // that was asked for; 0: the format's
+    bool is_8_bit;
+};
+
+/* The mean of some pictures, as it grows. */
+struct mean {
+    struct gn_image_file last; // picture that came last
+    int full_scale, bits;
+    size_t n_values;
+    uint32_t *sums;  // [n_values]
+    double squares;  // of the differences of each picture and the one before
+    double level[2]; // least and largest mean code of a picture
+};
+
+/* What an exposure's pictures look like. */
+struct figures {
+    double span;    // of codes, 1st to 99th percentile, share of full scale
+    double clipped; // share of values
+};
+
+static const struct {
+    const char *name;
+    double us;
+} units[] = {{"us", 1}, {"ms", 1e3}, {"s", 1e6}};
+
+/* Takes "ms" and the like at *at; 0 where there is none. */
+static double take_unit(const char **at)
+{
+    for (size_t i = 0; i < GN_ARRAY_LEN(units); i++) {
+        size_t n = strlen(units[i].name);
+        if (strncmp(*at, units[i].name, n) == 0 && strchr(", ", (*at)[n])) {
+            *at += n;
+            return units[i].us;
+        }
+    }
+    return 0;
+}
+
+static int refuse_list(const char *text, struct gn_error *out_error)
+{
+    return gn_error_set(out_error, -EINVAL,
+                        "--exposures %.80s: right would be up to %d times above 0 with a unit, as "
+                        "1,2,4,8ms or 1/60,1/30s, counts without one, or auto",
+                        text, GN_SERIES_MAX);
+}
+
+/* "1,2,4ms": a number without a unit has that of the next one; none at all are counts. */
+static int read_plan(const char *text, struct plan *out, struct gn_error *out_error)
+{
+    double unit_us = 0;
+    int n_plain = 0; // numbers at the end that have no unit yet
+    *out = (struct plan){.is_auto = strcmp(text, "auto") == 0};
+    for (const char *at = text; *at && !out->is_auto;) {
+        double value;
+        at += strspn(at, ", ");
+        if (!*at)
+            break;
+        if (out->n == GN_SERIES_MAX || !gn_calibrate_take_number(&at, &value) || !(value > 0))
+            return refuse_list(text, out_error);
+        unit_us = take_unit(&at);
+        if (*at && !strchr(", ", *at))
+            return refuse_list(text, out_error);
+        out->values[out->n++] = value;
+        n_plain++;
+        for (; unit_us > 0 && n_plain > 0; n_plain--)
+            out->values[out->n - n_plain] *= unit_us;
+    }
+    if (n_plain == out->n && n_plain > 0)
+        out->unit = GN_EXPOSURE_COUNTS;
+    else if (n_plain > 0 || (out->n == 0 && !out->is_auto))
+        return refuse_list(text, out_error);
+    return 0;
+}
+
+static const char *get_unit(const struct work *w)
+{
+    return w->unit == GN_EXPOSURE_US ? "us" : "counts";
+}
+
+static double get_code(const struct gn_image_file *picture, size_t i)
+{
+    return picture->kind == GN_IMAGE_CODES8 ? picture->codes8.data[i] : picture->codes16.data[i];
+}
+
+/* Adds a picture, which it takes over. */
+static int add_picture(struct mean *m, int k, struct gn_image_file *picture, struct gn_error *error)
+{
+    const struct gn_image_file *p = picture, *last = &m->last;
+    bool is_8 = p->kind == GN_IMAGE_CODES8;
+    size_t n =
+        is_8 ? (size_t)p->codes8.width * (size_t)p->codes8.height * (size_t)p->codes8.channels
+             : (size_t)p->codes16.width * (size_t)p->codes16.height * (size_t)p->codes16.channels;
+    if (k == 0) {
+        m->n_values = n;
+        m->sums = calloc(n, sizeof(*m->sums));
+        if (!m->sums)
+            return gn_error_set(error, -ENOMEM, "out of memory");
+    } else if (n != m->n_values || p->kind != last->kind) {
+        return gn_error_set(error, -EINVAL, "the camera's pictures are not of one size");
+    }
+    double level = 0, squares = 0;
+    for (size_t i = 0; i < n; i++) {
+        double code = get_code(p, i), step = k > 0 ? code - get_code(last, i) : 0;
+        m->sums[i] += (uint32_t)code;
+        level += code;
+        squares += step * step;
+    }
+    m->squares += squares;
+    m->level[0] = k == 0 ? level / (double)n : fmin(m->level[0], level / (double)n);
+    m->level[1] = k == 0 ? level / (double)n : fmax(m->level[1], level / (double)n);
+    gn_image_file_finish(&m->last);
+    m->last = *picture;
+    memset(picture, 0, sizeof(*picture));
+    return 0;
+}
+
+static void finish_mean(struct mean *m)
+{
+    gn_image_file_finish(&m->last);
+    free(m->sums);
+    memset(m, 0, sizeof(*m));
+}
+
+/* The mean in the place of the last picture: rounded to its own codes where they have 8 bits and
+ * such are wanted, else in 16 bits and as much finer as these are. */
+static int close_mean(struct mean *m, int n, bool is_8_bit, struct gn_image_file *out,
+                      struct gn_error *error)
+{
+    const uint32_t count = (uint32_t)n;
+    struct gn_image_file *last = &m->last;
+    bool is_8 = last->kind == GN_IMAGE_CODES8;
+    uint32_t finer = is_8_bit && is_8 ? 1 : 65535 / (uint32_t)m->full_scale;
+    memset(out, 0, sizeof(*out));
+    if (is_8 && !is_8_bit) {
+        out->kind = GN_IMAGE_CODES16;
+        if (gn_image16_init(&out->codes16, last->codes8.width, last->codes8.height,
+                            last->codes8.channels) < 0)
+            return gn_error_set(error, -ENOMEM, "out of memory");
+    } else {
+        *out = *last;
+        memset(last, 0, sizeof(*last));
+    }
+    for (size_t i = 0; i < m->n_values; i++) {
+        uint32_t mean = (uint32_t)(((uint64_t)m->sums[i] * finer + count / 2) / count);
+        if (out->kind == GN_IMAGE_CODES8)
+            out->codes8.data[i] = (uint8_t)mean;
+        else
+            out->codes16.data[i] = (uint16_t)(mean < 65535 ? mean : 65535);
+    }
+    m->full_scale *= (int)finer;
+    return 0;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static struct figures find_figures(const struct mean *m, int n)
+{
+    double sample[4096], clipped = 0;
+    size_t count = 0, stride = 1 + m->n_values / GN_ARRAY_LEN(sample);
+    for (size_t i = 0; i < m->n_values; i += stride) {
+        sample[count++] = m->sums[i] / ((double)n * m->full_scale);
+        clipped += sample[count - 1] >= BRIGHT_RAIL;
+    }
+    qsort(sample, count, sizeof(*sample), compare_doubles);
+    return (struct figures){.span = sample[count - 1 - count / 100] - sample[count / 100],
+                            .clipped = clipped / (double)count};
+}
+
+/* Waits until pictures have the exposure that was set. Returns 0 or a negative errno. */
+static int settle(const struct work *w, double value, struct gn_error *out_error)
+{
+    int64_t set_ns = gn_clock_get_monotonic_ns();
+    double half_ns = w->unit == GN_EXPOSURE_US ? 500 * value : 0, said = 0;
+    for (int i = 0, n_since = 0; i < MAX_WAIT && n_since < SETTLING; i++) {
+        struct gn_capture capture;
+        int got = gn_calibrate_wait(w->program, w->source, &capture, out_error);
+        if (got <= 0)
+            return got < 0 ? got : -EINTR;
+        said = w->unit == GN_EXPOSURE_US ? capture.exposure_us : 0;
+        if (said > 0 && fabs(said - value) <= SAME_EXPOSURE * value + 1)
+            return 0;
+        // Those that began later, and some more.
+        n_since += said <= 0 && (double)(capture.time_ns - set_ns) >= half_ns;
+    }
+    if (said > 0)
+        return gn_error_set(out_error, -EIO,
+                            "the camera says that its pictures have %g us after %g us were set",
+                            said, value);
+    return 0;
+}
+
+static int take_mean(const struct work *w, struct mean *m, struct gn_error *out_error)
+{
+    for (int k = 0; k < w->n_frames; k++) {
+        struct gn_capture capture;
+        struct gn_image_file picture = {.kind = GN_IMAGE_LINEAR};
+        int got = gn_calibrate_wait(w->program, w->source, &capture, out_error);
+        if (got <= 0)
+            return got < 0 ? got : -EINTR;
+        int err = gn_calibrate_decode(&capture, &picture, &m->full_scale, out_error);
+        m->full_scale = w->full_scale ? w->full_scale : m->full_scale;
+        m->bits = capture.bits > 0 ? capture.bits : (int)lround(log2(m->full_scale + 1.0));
+        if (!err)
+            err = add_picture(m, k, &picture, out_error);
+        gn_image_file_finish(&picture);
+        if (err)
+            return err;
+    }
+    return 0;
+}
+
+static int name_picture(struct work *w, double value, struct gn_error *out_error)
+{
+    char name[4096];
+    struct gn_calibrate_series *s = w->series;
+    int n = w->folder ? snprintf(name, sizeof(name), "%s/exposure-%02d.png", w->folder, s->n + 1)
+                      : snprintf(name, sizeof(name), "%g %s", value, get_unit(w));
+    if (n < 0 || (size_t)n >= sizeof(name))
+        return gn_error_set(out_error, -ENAMETOOLONG, "--save: the folder's name is too long");
+    free(s->names[s->n]);
+    s->names[s->n] = strdup(name);
+    return s->names[s->n] ? 0 : gn_error_set(out_error, -ENOMEM, "out of memory");
+}
+
+/* One exposure. least_span: a picture whose codes span less is not kept. */
+static int shoot(struct work *w, double asked, double least_span, struct figures *out_figures,
+                 struct gn_error *out_error)
+{
+    struct gn_calibrate_series *s = w->series;
+    struct mean m = {.full_scale = 255};
+    double value = 0;
+    int err = gn_source_set_exposure(w->source, asked, &value, out_error);
+    if (!err)
+        err = settle(w, value, out_error);
+    if (!err)
+        err = take_mean(w, &m, out_error);
+    if (!err && 2 * m.n_values * (size_t)(s->n + 1) > MAX_BYTES)
+        err = gn_error_set(out_error, -ENOMEM,
+                           "more than %zu MiB of pictures: take fewer exposures, or a smaller "
+                           "--frame-size",
+                           MAX_BYTES >> 20);
+    if (err) {
+        finish_mean(&m);
+        return err;
+    }
+    *out_figures = find_figures(&m, w->n_frames);
+    double noise = sqrt(m.squares / (2 * fmax(w->n_frames - 1, 1) * (double)m.n_values));
+    bool is_kept = out_figures->span >= least_span;
+    printf("%g %s", value, get_unit(w));
+    if (fabs(value - asked) > 1e-6 * asked)
+        printf(" (asked %g)", asked);
+    if (w->n_frames > 1)
+        printf(": mean of %d, noise %.2f codes of %d, level steady to %.2f", w->n_frames, noise,
+               m.full_scale, m.level[1] - m.level[0]);
+    printf("; %.1f %% clipped%s\n", 100 * out_figures->clipped,
+           is_kept ? "" : "; too dark, left out");
+    fflush(stdout);
+    if (is_kept)
+        err = close_mean(&m, w->n_frames, w->is_8_bit, &s->taken[s->n], out_error);
+    if (is_kept && !err)
+        err = name_picture(w, value, out_error);
+    if (is_kept && !err && w->folder)
+        err = gn_calibrate_write(s->names[s->n], &s->taken[s->n], out_error);
+    if (is_kept && !err) {
+        s->times[s->n++] = value;
+        s->format.full_scale16 = m.full_scale;
+        s->bits = m.bits;
+    }
+    finish_mean(&m);
+    return err;
+}
+
+/* The exposure that the camera had, then all from its shortest on. */
+static int shoot_doubling(struct work *w, const struct gn_exposure *range,
+                          struct gn_error *out_error)
+{
+    struct figures figures = {0};
+    double most = w->unit == GN_EXPOSURE_US ? fmin(range->most, AUTO_MOST_US) : range->most;
+    int err = shoot(w, fmin(fmax(range->now, range->least), range->most), 0, &figures, out_error);
+    figures.clipped = 0;
+    for (double value = fmax(range->least, 1);
+         !err && value <= most && figures.clipped < AUTO_CLIPPED && w->series->n < GN_SERIES_MAX;
+         value *= 2)
+        err = shoot(w, value, AUTO_SPAN, &figures, out_error);
+    return err;
+}
+
+static int shoot_all(struct work *w, const struct plan *plan, const struct gn_exposure *range,
+                     struct gn_error *out_error)
+{
+    struct figures figures;
+    int err = 0;
+    if (plan->is_auto)
+        return shoot_doubling(w, range, out_error);
+    for (int i = 0; i < plan->n; i++) // before the first minute has gone by
+        if (!(plan->values[i] >= range->least * 0.999 && plan->values[i] <= range->most * 1.001))
+            return gn_error_set(
+                out_error, -ERANGE,
+                "--exposures: %g %s is not in [%g, %g] %s, which the camera takes "
+                "now%s",
+                plan->values[i], get_unit(w), range->least, range->most, get_unit(w),
+                plan->values[i] > range->most ? "; a lower --frame-rate may allow longer ones"
+                                              : "");
+    for (int i = 0; !err && i < plan->n; i++) {
+        printf("exposure %d of %d: ", i + 1, plan->n);
+        fflush(stdout);
+        err = shoot(w, plan->values[i], 0, &figures, out_error);
+    }
+    return err;
+}
+
+/* Everything at the camera whose settings are held. */
+static int expose(struct work *w, struct plan *plan, struct gn_error *out_error)
+{
+    struct gn_exposure range = {0};
+    struct gn_error why = {0};
+    int err = gn_source_hold_exposure(w->source, plan->unit, &range, out_error);
+    if (err == -ENOTSUP && plan->is_auto) { // a camera that counts, or none at all
+        plan->unit = GN_EXPOSURE_COUNTS;
+        if (gn_source_hold_exposure(w->source, plan->unit, &range, &why) == 0)
+            err = 0;
+    }
+    if (err)
+        return err;
+    w->unit = plan->unit;
+    err = shoot_all(w, plan, &range, out_error);
+    if (err == -EINTR)
+        gn_error_set(out_error, err,
+                     "interrupted after %d exposures; the result's file is as it was",
+                     w->series->n);
+    int err_back = gn_source_restore_exposure(w->source, &why);
+    if (err_back && err)
+        gn_cmd_fail(w->program, why.text);
+    else if (err_back)
+        err = gn_error_set(out_error, err_back, "%s", why.text);
+    return err;
+}
+
+/* times.txt, and how to calibrate from what was written. */
+static int write_times(const struct work *w, struct gn_error *out_error)
+{
+    const struct gn_calibrate_series *s = w->series;
+    char *text = NULL, path[4096];
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    for (int k = 0; k < s->n; k++)
+        fprintf(out, "%.17g # %s, %s\n", s->times[k], get_unit(w), strrchr(s->names[k], '/') + 1);
+    fclose(out);
+    int n = snprintf(path, sizeof(path), "%s/times.txt", w->folder);
+    int err = n < 0 || (size_t)n >= sizeof(path)
+                  ? gn_error_set(out_error, -ENAMETOOLONG, "--save: the folder's name is too long")
+                  : gn_file_write(path, text, size, out_error);
+    free(text);
+    if (!err && w->is_8_bit)
+        printf("written; again by --stack '%s' --times '%s'\n", w->folder, path);
+    else if (!err)
+        printf("written; again by --chart '%s' --times '%s' --full-scale %d --bits %d\n", w->folder,
+               path, s->format.full_scale16, s->bits);
+    return err;
+}
+
+int gn_calibrate_series_take(struct gn_calibrate_series *series, const struct gn_program *program,
+                             const struct gn_options *options, bool is_8_bit,
+                             struct gn_error *out_error)
+{
+    struct plan plan;
+    struct work w = {.series = series,
+                     .program = program,
+                     .folder = gn_options_get_string(options, NULL, NULL, "save"),
+                     .n_frames = DEFAULT_FRAMES,
+                     .full_scale = gn_options_get_int(options, NULL, NULL, "full-scale"),
+                     .is_8_bit = is_8_bit};
+    if (gn_options_is_set(options, NULL, NULL, "frames"))
+        w.n_frames = (int)gn_options_get_int(options, NULL, NULL, "frames");
+    int err = read_plan(gn_options_get_string(options, NULL, NULL, "exposures"), &plan, out_error);
+    series->taken = calloc(GN_SERIES_MAX, sizeof(*series->taken));
+    if (!err && !series->taken)
+        err = gn_error_set(out_error, -ENOMEM, "out of memory");
+    if (!err && w.folder)
+        err = gn_calibrate_make_folder("save", w.folder, out_error);
+    gn_cmd_catch_signals();
+    if (!err)
+        err = gn_live_open(options, &(struct gn_live_options){.is_8_bit = is_8_bit}, &w.source,
+                           out_error);
+    if (!err) {
+        err = expose(&w, &plan, out_error);
+        if (!err)
+            gn_live_print_counts(w.source, stdout);
+    }
+    gn_source_close(&w.source);
+    if (!err && w.folder)
+        err = write_times(&w, out_error);
+    series->has_times = true;
+    return err;
+}
