@@ -131,27 +131,43 @@ static void write_codes(const struct writer *w, const uint16_t *codes, size_t n,
     }
 }
 
-/** One row of a mosaic; each row has one mirrored sample more at both ends. */
-static void interpolate_row(const struct gn_pixels_format *f, int y, int width,
-                            const uint16_t *above, const uint16_t *row, const uint16_t *below,
-                            uint16_t *rgb)
+/** Rows of a mosaic around the one that is worked on; each has one mirrored sample more at both
+ * ends. own, other: places in R, G, B of that row's colour besides green, and of the other's. */
+struct mosaic {
+    const uint16_t *above, *row, *below;
+    int own, other;
+};
+
+/** The pixel at x, which has the row's colour. */
+static inline void put_coloured(struct mosaic m, int x, uint16_t *rgb)
 {
-    bool is_red_row = (y & 1) == f->red_y;
-    int own = is_red_row ? 0 : 2; // the row's colour besides green
-    for (int x = 0; x < width; x++, rgb += 3) {
-        unsigned beside = (unsigned)row[x - 1] + row[x + 1];
-        unsigned upright = (unsigned)above[x] + below[x];
-        if (((x & 1) == f->red_x) == is_red_row) { // on red, or on blue
-            unsigned corners = (unsigned)above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1];
-            rgb[own] = row[x];
-            rgb[1] = (uint16_t)((beside + upright + 2) / 4);
-            rgb[2 - own] = (uint16_t)((corners + 2) / 4);
-        } else {
-            rgb[own] = (uint16_t)((beside + 1) / 2);
-            rgb[1] = row[x];
-            rgb[2 - own] = (uint16_t)((upright + 1) / 2);
-        }
+    unsigned sides = (unsigned)m.row[x - 1] + m.row[x + 1] + m.above[x] + m.below[x];
+    unsigned corners = (unsigned)m.above[x - 1] + m.above[x + 1] + m.below[x - 1] + m.below[x + 1];
+    rgb[m.own] = m.row[x];
+    rgb[1] = (uint16_t)((sides + 2) / 4);
+    rgb[m.other] = (uint16_t)((corners + 2) / 4);
+}
+
+/** The pixel at x, which is green. */
+static inline void put_green(struct mosaic m, int x, uint16_t *rgb)
+{
+    rgb[m.own] = (uint16_t)(((unsigned)m.row[x - 1] + m.row[x + 1] + 1) / 2);
+    rgb[1] = m.row[x];
+    rgb[m.other] = (uint16_t)(((unsigned)m.above[x] + m.below[x] + 1) / 2);
+}
+
+/** One row, in pairs of a coloured pixel and a green one. is_first_green: it begins with half. */
+static inline void interpolate_row(struct mosaic m, bool is_first_green, int width, uint16_t *rgb)
+{
+    int x = 0;
+    if (is_first_green)
+        put_green(m, x++, rgb);
+    for (; x + 1 < width; x += 2) {
+        put_coloured(m, x, rgb + 3 * x);
+        put_green(m, x + 1, rgb + 3 * x + 3);
     }
+    if (x < width)
+        put_coloured(m, x, rgb + 3 * x);
 }
 
 /** Unpacks row y and mirrors its ends: without repeating them, so that colours keep their order. */
@@ -177,10 +193,28 @@ static unsigned convert_mosaic(const struct gn_pixels_format *f, const struct wr
         if (y > 0 && y + 1 < height)
             all |= unpack_mosaic_row(f, source, y + 1, width, row[(y + 1) % 3]);
         int above = y > 0 ? y - 1 : 1, below = y + 1 < height ? y + 1 : height - 2;
-        interpolate_row(f, y, width, row[above % 3], row[y % 3], row[below % 3], rgb);
+        bool is_red_row = (y & 1) == f->red_y, is_first_green = (f->red_x == 0) != is_red_row;
+        // Told apart so that the compiler knows the places.
+        if (is_red_row)
+            interpolate_row((struct mosaic){row[above % 3], row[y % 3], row[below % 3], 0, 2},
+                            is_first_green, width, rgb);
+        else
+            interpolate_row((struct mosaic){row[above % 3], row[y % 3], row[below % 3], 2, 0},
+                            is_first_green, width, rgb);
         write_codes(w, rgb, 3 * n, out, 3 * n * (size_t)y);
     }
     return all;
+}
+
+/** n gray codes, at least one, to R, G, B: four bytes at once, the last of which is the next
+ * pixel's to write again. */
+static void widen(const uint8_t *codes, size_t n, uint8_t *rgb)
+{
+    for (size_t i = 0; i + 1 < n; i++) {
+        uint32_t four = codes[i] * 0x01010101u;
+        memcpy(rgb + 3 * i, &four, sizeof(four));
+    }
+    memset(rgb + 3 * (n - 1), codes[n - 1], 3);
 }
 
 /** Rows of samples that need no neighbours. Returns the bits that any has. */
@@ -190,6 +224,7 @@ static unsigned convert_rows(const struct gn_pixels_format *f, const struct writ
     unsigned all = 0;
     size_t n = (size_t)width * (size_t)count_channels(f);
     bool is_widened = f->kind == GN_PIXELS_MONO && w->is_8_bit; // gray to R, G, B
+    uint8_t *gray = (uint8_t *)(samples + n);
     for (size_t y = 0; y < (size_t)height; y++) {
         all |= unpack(f, source, y * n, n, samples);
         for (size_t i = 0; i < n && f->kind == GN_PIXELS_BGR; i += 3) {
@@ -197,10 +232,12 @@ static unsigned convert_rows(const struct gn_pixels_format *f, const struct writ
             samples[i] = samples[i + 2];
             samples[i + 2] = blue;
         }
-        for (size_t i = n;
-             i-- > 0 && is_widened;) // from the end: each is read before it is written
-            samples[3 * i] = samples[3 * i + 1] = samples[3 * i + 2] = samples[i];
-        write_codes(w, samples, is_widened ? 3 * n : n, out, (is_widened ? 3 * n : n) * y);
+        if (is_widened) {
+            write_codes(w, samples, n, gray, 0);
+            widen(gray, n, (uint8_t *)out + 3 * n * y);
+        } else {
+            write_codes(w, samples, n, out, n * y);
+        }
     }
     return all;
 }
