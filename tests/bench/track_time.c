@@ -6,30 +6,18 @@
  * a value noise of many sizes makes it.
  * usage: bench_track_time [frames]
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include "client/track/rotation.h"
 #include "client/track/tracker.h"
 #include "client/vision/markers.h"
 #include "common/jpeg.h"
+#include "tests/bench/marker_shots.h"
 #include "tests/bench/timing.h"
-#include "tests/rig/marker_picture.h"
-#include "tests/rig/random.h"
 
-enum { WIDTH = 640, HEIGHT = 480, N_SHOTS = 16 };
-
-static const struct gn_rig_view lens = {.width = WIDTH,
-                                        .height = HEIGHT,
-                                        .fx = 720,
-                                        .fy = 716,
-                                        .cx = 331.3,
-                                        .cy = 234.8,
-                                        .distortion = {-0.21, 0.11, 0.0012, -0.0007, -0.03},
-                                        .blur_px = 0.6};
+enum { WIDTH = GN_BENCH_SHOT_WIDTH, HEIGHT = GN_BENCH_SHOT_HEIGHT, N_SHOTS = 16 };
 
 /** What is measured: a picture's kind and what is in it. */
 static const struct {
@@ -50,68 +38,6 @@ static double get_processor_ms(void)
     return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
 }
 
-/** Blotches from 4 to 64 px, as dark and as light as the markers. */
-static void clutter(struct gn_image *linear)
-{
-    for (int y = 0; y < HEIGHT; y++) {
-        for (int x = 0; x < WIDTH; x++) {
-            float *p = gn_image_at(linear, x, y);
-            if (fabsf(p[0] - (float)gn_rig_backdrop) > 1e-3F)
-                continue;
-            double sum = 0;
-            for (uint32_t size = 4; size <= 64; size *= 2) {
-                uint32_t out[4];
-                gn_rig_philox((const uint32_t[4]){(uint32_t)x / size, (uint32_t)y / size, size, 0},
-                              (const uint32_t[2]){3, 1}, out);
-                sum += out[0] * 0x1p-32;
-            }
-            p[0] = p[1] = p[2] = (float)(0.8 * pow(sum / 5, 3));
-        }
-    }
-}
-
-static void shoot(const struct gn_rig_marker_camera *still, const struct gn_rig_sheet *sheet,
-                  bool is_cluttered, int i, struct gn_image8 *out)
-{
-    struct gn_rig_marker_camera camera = *still;
-    struct gn_image linear = {0};
-    double s = 0.02 * sin(0.3 * i);
-    const double eye[3] = {0.25 + s, -0.2, 0.38 + s}, target[3] = {0.01 + s, 0, 0};
-    const struct gn_rig_noise noise = {.slope = 1e-4, .offset = 2e-6};
-    gn_rig_look_at(eye, target, camera.view.world_from_camera);
-    gn_bench_check(gn_rig_take_markers(&camera, sheet, sheet->n_printed > 0, &linear), "picture");
-    if (is_cluttered)
-        clutter(&linear);
-    gn_bench_check(gn_image8_init(out, WIDTH, HEIGHT, 3), "picture");
-    gn_rig_photograph(linear.data, WIDTH * HEIGHT, &noise, 3, i, out->data);
-    gn_image_finish(&linear);
-}
-
-/** A world of that many markers, printed on a sheet. */
-static void make_world(int columns, int n_rows, struct gn_bodies *bodies,
-                       struct gn_rig_sheet *sheet)
-{
-    gn_bench_check(gn_bodies_read_text("6x6_250:0:0.08", bodies, NULL), "bodies");
-    struct gn_body *b = &bodies->bodies[0];
-    memset(sheet, 0, sizeof(*sheet));
-    gn_mat4_identity(sheet->world_from_sheet);
-    sheet->half_width = columns > 1 ? 0.1 : 0.06;
-    sheet->half_height = columns > 1 ? 0.08 : 0.06;
-    for (int i = 0; i < columns * n_rows; i++) {
-        struct gn_rig_printed *p = &sheet->printed[sheet->n_printed++];
-        *p = (struct gn_rig_printed){.x = (i % columns - (columns - 1) / 2.0) * 0.046,
-                                     .y = ((n_rows - 1) / 2.0 - i / columns) * 0.046,
-                                     .size = columns > 1 ? 0.036 : 0.08};
-        p->cells = gn_marker_get_cells(bodies->dictionary, i, p->white);
-        b->markers[i].id = i;
-        for (int k = 0; k < 4; k++) {
-            b->markers[i].corners_body[k][0] = p->x + (k == 1 || k == 2 ? 0.5 : -0.5) * p->size;
-            b->markers[i].corners_body[k][1] = p->y + (k < 2 ? 0.5 : -0.5) * p->size;
-        }
-    }
-    b->n_markers = columns * n_rows > 0 ? columns * n_rows : 1;
-}
-
 static void measure(int row, const struct gn_rig_marker_camera *rig, int n_frames)
 {
     static struct gn_bodies bodies;
@@ -121,20 +47,20 @@ static void measure(int row, const struct gn_rig_marker_camera *rig, int n_frame
     struct gn_capture captures[N_SHOTS];
     struct gn_camera camera = {.width = WIDTH,
                                .height = HEIGHT,
-                               .fx = lens.fx,
-                               .fy = lens.fy,
-                               .cx = lens.cx,
-                               .cy = lens.cy,
+                               .fx = gn_bench_lens.fx,
+                               .fy = gn_bench_lens.fy,
+                               .cx = gn_bench_lens.cx,
+                               .cy = gn_bench_lens.cy,
                                .response = {.type = GN_RESPONSE_SRGB},
                                .world_from_camera = {.rotation = {1, 0, 0, 0}}};
     struct gn_tracker *tracker = NULL;
     struct gn_jpeg *jpeg = NULL;
     struct gn_bench_times times = {0};
-    memcpy(camera.distortion, lens.distortion, sizeof(camera.distortion));
-    make_world(rows[row].columns, rows[row].rows, &bodies, &sheet);
+    memcpy(camera.distortion, gn_bench_lens.distortion, sizeof(camera.distortion));
+    gn_bench_make_world(rows[row].columns, rows[row].rows, &bodies, &sheet);
     gn_bench_check(gn_jpeg_create(&jpeg), "jpeg");
     for (int i = 0; i < N_SHOTS; i++) {
-        shoot(rig, &sheet, rows[row].is_cluttered, i, &shots[i]);
+        gn_bench_shoot(rig, &sheet, rows[row].is_cluttered, i, &shots[i]);
         size_t size = 0;
         captures[i] = (struct gn_capture){.name = "shot",
                                           .width = WIDTH,
@@ -186,7 +112,7 @@ int main(int argc, char *argv[])
         puts("this build has no OpenCV");
         return 0;
     }
-    gn_bench_check(gn_rig_marker_camera_init(&rig, &lens), "lens");
+    gn_bench_check(gn_rig_marker_camera_init(&rig, &gn_bench_lens), "lens");
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
         measure((int)i, &rig, n_frames);
     gn_rig_marker_camera_finish(&rig);

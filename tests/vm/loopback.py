@@ -41,7 +41,7 @@ def write_script(stage, address):
         "until grep -q '^frame %d:' view.out || ! kill -0 $view; do sleep 0.1; done 2>/dev/null\n"
         'kill -TERM $view\nwait $view\necho $? >view.rc\n'
         'kill $feed\n' % (
-            quote(FEED, VIDEO, RATE, os.path.join(stage.sequence, stage.frame['picture'])),
+            quote(FEED, VIDEO, RATE, 'YUYV', os.path.join(stage.sequence, stage.frame['picture'])),
             quote(*view), N_COMPOSITES))
 
 
