@@ -2,13 +2,9 @@
 /* SPDX-License-Identifier: ISC */
 #include "client/capture/gige_device.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
-#include <poll.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <arv.h>
 
@@ -19,9 +15,12 @@
 /** Receive buffer; the kernel cuts it to net.core.rmem_max. Without CAP_NET_RAW Aravis receives by
  * a plain socket, and with the usual 208 KiB most of a picture is lost. */
 #define SOCKET_BUFFER_BYTES (8 << 20)
-#define GVCP_PORT 3956
 /** How often control is asked for again. */
 #define CONTROL_RETRY_MS 200
+/** Longest exposure that a camera is believed. */
+#define MAX_EXPOSURE_US 3.6e9
+/** Kinds of triggers that are looked at; the standard has 18 (SFNC 2.7, "TriggerSelector"). */
+#define MAX_TRIGGERS 64
 
 static int set_arv_error(struct gn_error *out_error, int err, const struct gn_gige_place *place,
                          const char *what, GError **error)
@@ -30,86 +29,6 @@ static int set_arv_error(struct gn_error *out_error, int err, const struct gn_gi
                  *error ? (*error)->message : "no reason given");
     g_clear_error(error);
     return err;
-}
-
-static bool is_same(const char *a, const char *b)
-{
-    return a && strcmp(a, b) == 0;
-}
-
-/** An address that is given needs no search, and may lie behind a router. Whether it is one. */
-static bool make_place(const char *address, struct gn_gige_place *out_place)
-{
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(GVCP_PORT)}, from = {0};
-    socklen_t length = sizeof(from);
-    if (inet_pton(AF_INET, address, &to.sin_addr) != 1)
-        return false;
-    memset(out_place, 0, sizeof(*out_place));
-    snprintf(out_place->id, sizeof(out_place->id), "%s", address);
-    snprintf(out_place->address, sizeof(out_place->address), "%s", address);
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)&to, sizeof(to)) == 0 &&
-        getsockname(fd, (struct sockaddr *)&from, &length) == 0)
-        (void)!inet_ntop(AF_INET, &from.sin_addr, out_place->interface,
-                         sizeof(out_place->interface));
-    if (fd >= 0)
-        close(fd);
-    return true;
-}
-
-int gn_gige_place_find(const char *id, struct gn_gige_place *out_place, struct gn_error *out_error)
-{
-    if (make_place(id, out_place)) {
-        if (out_place->interface[0] && gn_gige_place_answers(out_place))
-            return 0;
-        return gn_error_set(out_error, -ENODEV,
-                            "--gige %s: no GigE Vision camera answers at this address", id);
-    }
-    ArvInterface *gv = arv_gv_interface_get_instance();
-    arv_interface_update_device_list(gv);
-    unsigned n = arv_interface_get_n_devices(gv);
-    char found[256] = "";
-    for (unsigned i = 0; i < n; i++) {
-        const char *device_id = arv_interface_get_device_id(gv, i);
-        const char *address = arv_interface_get_device_address(gv, i);
-        if (strcmp(id, "any") == 0 || is_same(device_id, id) || is_same(address, id) ||
-            is_same(arv_interface_get_device_physical_id(gv, i), id) ||
-            is_same(arv_interface_get_device_serial_nbr(gv, i), id)) {
-            memset(out_place, 0, sizeof(*out_place));
-            snprintf(out_place->id, sizeof(out_place->id), "%s", device_id ? device_id : id);
-            snprintf(out_place->address, sizeof(out_place->address), "%s", address ? address : "");
-            return 0;
-        }
-        size_t length = strlen(found);
-        snprintf(found + length, sizeof(found) - length, "%s%s", i ? ", " : "", device_id);
-    }
-    if (n == 0)
-        return gn_error_set(out_error, -ENODEV,
-                            "--gige %s: no GigE Vision camera answers in the networks of this "
-                            "machine",
-                            id);
-    return gn_error_set(out_error, -ENODEV, "--gige %s: no such camera; there are: %s", id, found);
-}
-
-bool gn_gige_place_answers(const struct gn_gige_place *place)
-{
-    // GVCP DISCOVERY_CMD: key, flag "acknowledge", command, no payload, request id (GigE
-    // Vision 2.0, 16.2). Its answer is DISCOVERY_ACK.
-    static const uint8_t command[8] = {0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01};
-    uint8_t answer[512];
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(GVCP_PORT)};
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    bool is_there = false;
-    if (fd >= 0 && inet_pton(AF_INET, place->address, &to.sin_addr) == 1 &&
-        connect(fd, (const struct sockaddr *)&to, sizeof(to)) == 0 &&
-        send(fd, command, sizeof(command), MSG_NOSIGNAL) == (ssize_t)sizeof(command)) {
-        struct pollfd wait = {.fd = fd, .events = POLLIN};
-        is_there = poll(&wait, 1, 100) == 1 && recv(fd, answer, sizeof(answer), 0) >= 8 &&
-                   answer[2] == 0x00 && answer[3] == 0x03;
-    }
-    if (fd >= 0)
-        close(fd);
-    return is_there;
 }
 
 /** Opens the device: where its interface is known, without asking all networks for it. */
@@ -231,6 +150,17 @@ static int set_size(struct gn_gige_device *d, const struct gn_gige_place *place,
     return 0;
 }
 
+/** Aravis switches all triggers off for it, and leaves the selector at the last. */
+static void set_rate(ArvCamera *camera, double rate_hz, GError **error)
+{
+    ArvDevice *device = arv_camera_get_device(camera);
+    char *selector = g_strdup(arv_device_get_string_feature_value(device, "TriggerSelector", NULL));
+    arv_camera_set_frame_rate(camera, rate_hz, error);
+    if (selector)
+        arv_device_set_string_feature_value(device, "TriggerSelector", selector, NULL);
+    g_free(selector);
+}
+
 /** Rate, exposure and gain: set where asked for, read where it says. */
 static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *place,
                         const struct gn_live_options *options, struct gn_error *out_error)
@@ -253,13 +183,45 @@ static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *pl
     if (error)
         return set_arv_error(out_error, -EINVAL, place, "cannot set --gain", &error);
     if (options->frame_rate_hz > 0)
-        arv_camera_set_frame_rate(c, options->frame_rate_hz, &error);
+        set_rate(c, options->frame_rate_hz, &error);
     if (error)
         return set_arv_error(out_error, -EINVAL, place, "cannot set --frame-rate", &error);
-    // What it does not say is 0.
-    d->frame_rate_hz = arv_camera_get_frame_rate(c, NULL);
-    d->exposure_us = arv_camera_get_exposure_time(c, NULL);
+    d->frame_rate_hz = arv_camera_get_frame_rate(c, NULL); // 0: it does not say
+    gn_gige_device_read_exposure(d);
     return 0;
+}
+
+void gn_gige_device_read_exposure(struct gn_gige_device *device)
+{
+    double us = arv_camera_get_exposure_time(device->camera, NULL);
+    device->exposure_us = us > 0 && us <= MAX_EXPOSURE_US ? us : 0;
+}
+
+static bool is_trigger_on(ArvDevice *device)
+{
+    const char *mode = arv_device_get_string_feature_value(device, "TriggerMode", NULL);
+    return mode && strcmp(mode, "On") == 0;
+}
+
+/** Whether any of the camera's triggers is on: its selector is led through all, and put back. */
+static bool waits_for_triggers(ArvDevice *device)
+{
+    const char *now = arv_device_get_string_feature_value(device, "TriggerSelector", NULL);
+    char *before = g_strdup(now);
+    bool is_on = is_trigger_on(device);
+    guint n = 0;
+    const char **names = before ? arv_device_dup_available_enumeration_feature_values_as_strings(
+                                      device, "TriggerSelector", &n, NULL)
+                                : NULL;
+    for (guint i = 0; i < n && i < MAX_TRIGGERS && !is_on; i++) {
+        arv_device_set_string_feature_value(device, "TriggerSelector", names[i], NULL);
+        is_on = is_trigger_on(device);
+    }
+    if (n > 0)
+        arv_device_set_string_feature_value(device, "TriggerSelector", before, NULL);
+    g_free(names);
+    g_free(before);
+    return is_on;
 }
 
 /** Settings by the camera's own names, "NAME=VALUE,...", which have the last word. */
@@ -363,8 +325,10 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
 {
     struct gn_gige_device d = {0};
     GError *error = NULL;
+    int err = gn_gige_place_check_description(place, out_error);
+    if (err)
+        return err;
     ArvDevice *device = open_device(place, &error);
-    int err;
     if (!device)
         return set_arv_error(out_error, -EIO, place, "cannot open it", &error);
     d.camera = arv_camera_new_with_device(device, &error);
@@ -383,6 +347,7 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
     if (!err)
         err = set_size(&d, place, options, out_error);
     if (!err) {
+        d.is_triggered = waits_for_triggers(device);
         set_chunks(&d);
         err = start_stream(&d, place, out_error);
     }
@@ -397,6 +362,16 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
     }
     g_object_unref(device);
     return err;
+}
+
+bool gn_gige_device_is_ours(const struct gn_gige_device *device)
+{
+    return arv_gv_device_is_controller(ARV_GV_DEVICE(arv_camera_get_device(device->camera)));
+}
+
+uint64_t gn_gige_device_count_packets(const struct gn_gige_device *device)
+{
+    return arv_stream_get_info_uint64_by_name(device->stream, "n_received_packets");
 }
 
 void gn_gige_device_close(struct gn_gige_device *device)

@@ -10,19 +10,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "client/capture/gige_place.h"
 #include "client/capture/pixels.h"
 #include "client/capture/source.h"
 #include "common/error.h"
 #include "proto/attr.h"
 
 struct _ArvBuffer; // ArvBuffer
-
-/** Where a camera was found. */
-struct gn_gige_place {
-    char id[128];       // Aravis' name of it: maker-serial number
-    char address[64];   // of the camera
-    char interface[64]; // of ours that reaches it
-};
 
 /** Values. The objects are owned; all NULL: not open. */
 struct gn_gige_device {
@@ -35,14 +29,8 @@ struct gn_gige_device {
     size_t picture_bytes; // of one picture as the camera sends it
     double frame_rate_hz; // 0: it does not say
     double exposure_us;   // 0: it does not say
+    bool is_triggered;    // pictures come when a trigger does, or never
 };
-
-/** Looks for a camera by id, serial number, address, or any. 0, or -ENODEV and a sentence. */
-GN_MUST_USE int gn_gige_place_find(const char *id, struct gn_gige_place *out_place,
-                                   struct gn_error *out_error);
-
-/** Asks the camera at that place for a sign of life, for 100 ms. */
-bool gn_gige_place_answers(const struct gn_gige_place *place);
 
 /**
  * Opens, takes control, sets everything that options ask for and starts the stream. patience_ms:
@@ -76,6 +64,16 @@ GN_MUST_USE int gn_gige_exposure_set(struct gn_gige_device *device, const char *
                                      struct gn_error *out_error);
 GN_MUST_USE int gn_gige_exposure_restore(struct gn_gige_device *device, const char *id,
                                          struct gn_gige_noted *noted, struct gn_error *out_error);
+
+/** Reads the exposure time again: an automatic one changes. */
+void gn_gige_device_read_exposure(struct gn_gige_device *device);
+
+/** Whether the camera is still under our control, as far as its heartbeat has told by now: each
+ * second, and 5 s more where it does not answer at all. */
+bool gn_gige_device_is_ours(const struct gn_gige_device *device);
+
+/** Packets of pictures that have come since it was opened. */
+uint64_t gn_gige_device_count_packets(const struct gn_gige_device *device);
 
 /** Ends the stream and gives the camera up; takes seconds where it does not answer any more. */
 void gn_gige_device_close(struct gn_gige_device *device);

@@ -266,7 +266,68 @@ def test_controller():
         read_pictures('127.0.0.1', 'Mono12', 3)
 
 
-def count_lies(daemon, folder, seconds):
+def wait_for_error(program, words, timeout=30):
+    deadline = time.monotonic() + timeout
+    while words not in program.read_err():
+        assert program.process.poll() is None and time.monotonic() < deadline, program.read_err()
+        time.sleep(0.02)
+
+
+def test_triggers():
+    """A camera that waits for triggers is not lost between them; it is when it restarts."""
+    trigger = ['--trigger-ms', '500']  # 12 frame times
+    with Daemon() as daemon, Given() as folder, Camera(*size(), *trigger) as camera:
+        lamp = probe(daemon, folder, '--frame-rate', '25', '--controls', 'TriggerMode=On')
+        lamp.wait_for('environment frame 4:')
+        assert lamp.read_err() == ''
+        camera.kill()
+        with Camera(*size(), *trigger):
+            wait_for_error(lamp, ': back')
+            lamp.wait_for('environment frame [5-9]:')
+            out, err = lamp.interrupt()
+        assert re.match('.*: lost: .* restarted or answers no more.*\n.*: back\n$', err), err
+        # Its triggers are on again: at its frame rate it would have sent a dozen by now.
+        assert int(re.search(r'(\d+) environment frames sent', out).group(1)) < 10, out
+
+
+def test_silence():
+    """A camera that answers while its packets do not arrive: said once, with what to look for; and
+    one whose exposures grow by themselves: not lost."""
+    with Daemon() as daemon, Given() as folder:
+        with Camera(*size(), '--fault', 'silent'):
+            lamp = probe(daemon, folder, '--frame-rate', '25')
+            wait_for_error(lamp, 'not a packet of one, though it answers')
+        with Camera(*size()):
+            lamp.wait_for('environment frame 1:')
+            _, err = lamp.interrupt()
+        assert ': back\n' in err and err.count('not a packet') == 1, err
+        with Camera(*size(), '--fault', 'dim'):
+            lamp = probe(daemon, folder, '--frame-rate', '50', '--count', '24')
+            assert lamp.end()[1] == ''
+
+
+def test_packet_size():
+    """Packets that are too large for the network become smaller ones."""
+    with Daemon() as daemon, Given() as folder, Camera(*size(), '--max-packet', '1500'):
+        out, err = probe(daemon, folder, '--controls', 'GevSCPSPacketSize=9000', '--frame-rate',
+                         '50', '--count', '5').end()
+        assert ' 0 incomplete' in out and err == '', (out, err)
+
+
+def test_hostile_places():
+    """A description outside the camera, or endless; an address that is not its own."""
+    with Daemon() as daemon, Given() as folder:
+        for url in ('file:///etc/passwd', 'http://127.0.0.1/x.xml', 'local:x.xml;0;fffffffff',
+                    'local:x;0;1.xml;0;fffffffff', 'local:x.xml'):
+            with Camera(*size(), '--description', url):
+                _, err = probe(daemon, folder).end(1)
+                assert "'%s'" % url in err and err.count('\n') == 1, err
+        with Camera(*size(), '--said-address', '10.77.77.77'):
+            _, err = probe(daemon, folder, who='any').end(1)
+            assert 'its address 10.77.77.77 cannot be reached' in err, err
+
+
+def count_lies(daemon, folder, fault, seconds):
     """How many of the camera's pictures were refused while a probe read it, and none was sent."""
     before = daemon.read_log().count(' as probe')
     lamp = probe(daemon, folder, '--frame-rate', '50')
@@ -274,19 +335,22 @@ def count_lies(daemon, folder, seconds):
         assert lamp.process.poll() is None, lamp.read_err()
         time.sleep(0.02)
     time.sleep(seconds)
-    out, _ = lamp.interrupt()
-    count = re.search(r'camera: 0 whole pictures, (\d+) incomplete', out)
-    assert count and '0 environment frames sent' in out, out
+    out, err = lamp.interrupt()
+    n_whole = 20 if fault == 'change' else 0
+    count = re.search(r'camera: %d whole pictures, (\d+) incomplete' % n_whole, out)
+    assert count and re.search(r'^%d environment frames sent' % n_whole, out, re.M), out
+    n_told = err.count('its pictures are no longer %dx%d' % (WIDTH, HEIGHT))
+    assert n_told == (fault != 'truncated') or not int(count.group(1)), (fault, err)
     return int(count.group(1))
 
 
 def test_hostile():
     """Cameras that lie: no picture of theirs is given out; the daemon sees nothing of it."""
     with Daemon() as daemon, Given() as folder:
-        for fault in ('size', 'format', 'truncated'):
+        for fault in ('size', 'format', 'truncated', 'change'):
             with Camera(*size(), '--fault', fault):
                 for seconds in (0.7, 5, 20):  # the machine may be busy
-                    n_incomplete = count_lies(daemon, folder, seconds)
+                    n_incomplete = count_lies(daemon, folder, fault, seconds)
                     if n_incomplete > 3:
                         break
                 assert n_incomplete > 3, (fault, n_incomplete)
@@ -319,4 +383,5 @@ def test_settings():
 
 own_network.enter()
 run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_times, test_restart,
-           test_view, test_controller, test_hostile, test_settings])
+           test_view, test_controller, test_triggers, test_silence, test_packet_size,
+           test_hostile_places, test_hostile, test_settings])

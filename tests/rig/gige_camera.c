@@ -34,6 +34,8 @@
 /** Bootstrap registers (GigE Vision 2.0, 28). */
 #define REG_VERSION 0x0000
 #define REG_ADDRESS 0x0024
+#define REG_DESCRIPTION 0x0200
+#define URL_BYTES 512
 #define REG_CAPABILITY 0x0934
 #define REG_HEARTBEAT_MS 0x0938
 #define REG_CONTROL 0x0a00
@@ -47,6 +49,9 @@
 /** Frames kept for sending again. */
 #define N_KEPT 8
 #define MAX_FILES 4096
+/** Some faults begin after so many frames. */
+#define N_FAULTLESS 20
+#define DIM_US 600000
 
 enum fault {
     FAULT_NONE,
@@ -55,7 +60,10 @@ enum fault {
     FAULT_TRUNCATED,
     FAULT_CODES,
     FAULT_HUGE,
-    FAULT_DROP
+    FAULT_DROP,
+    FAULT_CHANGE,
+    FAULT_SILENT,
+    FAULT_DIM
 };
 
 static const struct gn_option option_table[] = {
@@ -143,10 +151,36 @@ static const struct gn_option option_table[] = {
     {.key = "fault",
      .flag = "fault",
      .type = GN_OPTION_ENUM,
-     .choices = "none|size|format|truncated|codes|huge|drop",
+     .choices = "none|size|format|truncated|codes|huge|drop|change|silent|dim",
      .default_value = "none",
      .help = "Lie: pictures of another size or format than agreed, their end missing, codes above "
-             "the format's, or an absurd size."},
+             "the format's, or an absurd size. drop: each fifth picture never leaves; change: "
+             "another size from the 20th on; silent: no picture ever leaves; dim: from the 20th on "
+             "each is exposed for 0.6 s."},
+    {.key = "trigger-ms",
+     .flag = "trigger-ms",
+     .type = GN_OPTION_DOUBLE,
+     .min = 0,
+     .max = 1e6,
+     .default_value = "0",
+     .help = "How often a trigger comes, for a client that sets TriggerMode=On; 0: never."},
+    {.key = "max-packet",
+     .flag = "max-packet",
+     .type = GN_OPTION_INT,
+     .min = 100,
+     .max = 65535,
+     .default_value = "65535",
+     .help = "Packets of pictures of more bytes, with their IP heads, do not arrive."},
+    {.key = "description",
+     .flag = "description",
+     .type = GN_OPTION_STRING,
+     .value_name = "URL",
+     .help = "Where it says that its GenICam file is, instead of in its memory."},
+    {.key = "said-address",
+     .flag = "said-address",
+     .type = GN_OPTION_STRING,
+     .value_name = "ADDRESS",
+     .help = "What it says its address is."},
 };
 
 static const struct gn_program program = {
@@ -172,7 +206,8 @@ struct frame {
 struct camera {
     ArvFakeCamera *fake;
     enum fault fault;
-    double loss, step_s, delay_ms, noise;
+    double loss, step_s, delay_ms, noise, trigger_ms;
+    size_t max_packet;
     bool can_resend, has_chunks;
     int n_files;
     struct gn_image16 *files;
@@ -257,6 +292,8 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
     } else {
         return;
     }
+    if (n + 28 > c->max_packet || c->fault == FAULT_SILENT)
+        return;
     if (!is_resent && drand48() < c->loss) {
         c->n_dropped++;
         return;
@@ -335,10 +372,12 @@ static void send_frame(struct camera *c)
     bool has_chunks = c->has_chunks && read_register(c, GN_GIGE_REG_CHUNK_MODE) &&
                       read_register(c, GN_GIGE_REG_CHUNK_ENABLE);
     size_t n_extra = has_chunks ? GN_GIGE_CHUNK_BYTES : 0;
+    bool is_half =
+        c->fault == FAULT_SIZE || (c->fault == FAULT_CHANGE && c->n_frames >= N_FAULTLESS);
     free(f->data);
     *f = (struct frame){.id = (uint16_t)(c->n_frames % 65535 + 1),
                         .format = c->fault == FAULT_FORMAT ? 0x01080002 : code,
-                        .width = (uint32_t)width / (c->fault == FAULT_SIZE ? 2 : 1),
+                        .width = (uint32_t)width / (is_half ? 2 : 1),
                         .height = (uint32_t)height,
                         .time_ns = c->has_chunks ? 0 : time_ns,
                         .n_bytes = n_bytes + n_extra,
@@ -399,6 +438,8 @@ static void fire_test_packet(const struct camera *c, uint32_t value)
     struct sockaddr_in to = {.sin_family = AF_INET,
                              .sin_port = htons((uint16_t)read_register(c, REG_STREAM_PORT))};
     arv_fake_camera_read_memory(c->fake, REG_STREAM_ADDRESS, 4, &to.sin_addr);
+    if ((value & 0xffff) > c->max_packet)
+        return;
     (void)!sendto(c->stream, zeros, (value & 0xffff) - 28, 0, (const struct sockaddr *)&to,
                   sizeof(to));
 }
@@ -492,6 +533,19 @@ static void look_after_stream(struct camera *c)
     c->is_streaming = is_on;
 }
 
+/** From one picture to the next; INT64_MAX: a trigger is waited for that never comes. */
+static int64_t get_period_ns(const struct camera *c)
+{
+    uint32_t us = read_register(c, ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US);
+    if (read_register(c, ARV_FAKE_CAMERA_REGISTER_TRIGGER_MODE))
+        return c->trigger_ms > 0 ? (int64_t)(c->trigger_ms * 1e6) : INT64_MAX;
+    if (c->fault == FAULT_DIM && c->n_frames >= N_FAULTLESS) {
+        arv_fake_camera_write_register(c->fake, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, DIM_US);
+        us = DIM_US;
+    }
+    return (us ? us : 1) * GN_NS_PER_US;
+}
+
 static void run(struct camera *c)
 {
     while (!atomic_load(&is_ending)) {
@@ -499,12 +553,14 @@ static void run(struct camera *c)
         answer_waiting(c, !c->is_streaming ? 20 : left_ns > 0 ? (int)(left_ns / GN_NS_PER_MS) : 0);
         look_after_stream(c);
         if (c->is_streaming && gn_clock_get_monotonic_ns() >= c->next_ns) {
-            uint32_t period_us =
-                read_register(c, ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US);
-            send_frame(c);
+            int64_t period_ns = get_period_ns(c);
+            if (period_ns < INT64_MAX)
+                send_frame(c);
+            else
+                period_ns = 20 * GN_NS_PER_MS; // until the triggers are off
             // Where the machine stood still, what was missed is left out, not sent in a burst.
             do {
-                c->next_ns += (period_us ? period_us : 1) * GN_NS_PER_US;
+                c->next_ns += period_ns;
             } while (c->next_ns < gn_clock_get_monotonic_ns());
         }
     }
@@ -575,6 +631,24 @@ static int open_sockets(struct camera *c, const char *address, struct gn_error *
     return 0;
 }
 
+/** Lies of the registers that a client reads first. */
+static int set_lies(struct camera *c, const struct gn_options *options, struct gn_error *error)
+{
+    const char *address = gn_options_get_string(options, NULL, NULL, "said-address");
+    const char *url = gn_options_get_string(options, NULL, NULL, "description");
+    struct in_addr said;
+    char text[URL_BYTES] = "";
+    if (address && inet_pton(AF_INET, address, &said) != 1)
+        return gn_error_set(error, -EINVAL, "--said-address %s: no IPv4 address", address);
+    if (address)
+        arv_fake_camera_write_memory(c->fake, REG_ADDRESS, 4, &said);
+    if (url) {
+        snprintf(text, sizeof(text), "%s", url);
+        arv_fake_camera_write_memory(c->fake, REG_DESCRIPTION, sizeof(text), text);
+    }
+    return 0;
+}
+
 /** The pattern into a buffer of Aravis' camera, whose size it does not know. */
 static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 gain,
                  ArvPixelFormat code)
@@ -622,6 +696,8 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     c.loss = gn_options_get_double(options, NULL, NULL, "loss");
     c.step_s = gn_options_get_double(options, NULL, NULL, "step-s");
     c.delay_ms = gn_options_get_double(options, NULL, NULL, "delay-ms");
+    c.trigger_ms = gn_options_get_double(options, NULL, NULL, "trigger-ms");
+    c.max_packet = (size_t)gn_options_get_int(options, NULL, NULL, "max-packet");
     c.has_chunks = gn_options_get_bool(options, NULL, NULL, "chunks");
     c.can_resend = !gn_options_get_bool(options, NULL, NULL, "no-resend");
     c.noise = gn_options_get_double(options, NULL, NULL, "noise");
@@ -638,6 +714,8 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     int err = response ? read_response(response, &c.response, error) : 0;
     if (!err)
         err = open_sockets(&c, gn_options_get_string(options, NULL, NULL, "address"), error);
+    if (!err)
+        err = set_lies(&c, options, error);
     if (!err && pattern)
         err = read_files(&c, pattern, width, height, error);
     if (!err) {

@@ -35,6 +35,14 @@ static const char chunk_nodes[] =
                           "<Length>8</Length><AccessMode>RO</AccessMode>"
                           "<pPort>ExposurePort</pPort><Endianess>BigEndian</Endianess></FloatReg>";
 
+/** As cameras have it: a client may ask whether packets of its size arrive (GigE Vision 2.0, 28).
+ */
+static const char test_packet_nodes[] =
+    "<Boolean Name=\"GevSCPSFireTestPacket\"><pValue>FireTestPacketReg</pValue></Boolean>"
+    "<MaskedIntReg Name=\"FireTestPacketReg\"><Address>0xd04</Address><Length>4</Length>"
+    "<AccessMode>RW</AccessMode><pPort>Device</pPort><Bit>0</Bit>"
+    "<Endianess>BigEndian</Endianess></MaskedIntReg>";
+
 /** Inserts before the first `mark`. Whether it was there. */
 static bool insert(GString *text, const char *mark, const char *what)
 {
@@ -64,7 +72,8 @@ static bool extend(GString *text)
     const char *formula = strstr(text->str, payload);
     if (formula)
         g_string_insert(text, formula - text->str + (gssize)strlen(payload), " + 40 * CHUNKS");
-    return is_good && insert(text, "</RegisterDescription>", chunk_nodes);
+    return is_good && insert(text, "</RegisterDescription>", test_packet_nodes) &&
+           insert(text, "</RegisterDescription>", chunk_nodes);
 }
 
 const char *gn_gige_write_genicam(void)
