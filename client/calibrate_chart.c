@@ -27,7 +27,6 @@ struct run {
     const struct gn_calibrate_series *series;
     struct gn_image mean; // of all pictures' codes: each patch lies between the rails in some
     struct gn_chart_place place;
-    bool has_place;
     bool is_mono; // by the pictures
     double code_step;
 };
@@ -39,8 +38,6 @@ static const char *get(const struct run *run, const char *key)
 
 static int read_place(struct run *run, struct gn_error *out_error)
 {
-    if (!get(run, "corners"))
-        return 0;
     int n = gn_calibrate_read_numbers("corners", get(run, "corners"), 0, 8, run->place.corners,
                                       out_error);
     if (n >= 0 && n != 8)
@@ -50,7 +47,6 @@ static int read_place(struct run *run, struct gn_error *out_error)
                          n);
     for (int i = 0; i < 8 && run->series->format.bayer; i++)
         run->place.corners[i] /= 2;
-    run->has_place = n == 8;
     return n < 0 ? n : 0;
 }
 
@@ -87,26 +83,51 @@ static int make_mean(struct run *run, struct gn_error *out_error)
     return err;
 }
 
-/* By OpenCV, where the build has it, and by the patches' grid where that does not see it. */
-static int find_place(struct run *run, struct gn_error *out_error)
+/* OpenCV's word, where it is like a chart. Errors count as not found: there is another way. */
+static bool find_by_opencv(const struct gn_image *image, struct gn_chart_place *out_place)
 {
     struct gn_image8 shades = {0};
+    struct gn_chart_place place;
     struct gn_error nothing = {0};
-    const char *by = "OpenCV";
-    if (gn_calibrate_stretch(&run->mean, &shades) < 0)
-        return gn_error_set(out_error, -ENOMEM, "out of memory");
-    int ret = gn_vision_find_chart(shades.data, shades.width, shades.height, run->place.corners,
-                                   &nothing);
+    bool is_found = gn_calibrate_stretch(image, &shades) == 0 &&
+                    gn_vision_find_chart(shades.data, shades.width, shades.height, place.corners,
+                                         &nothing) == 1 &&
+                    gn_chart_orient(image, &place) > LEAST_LIKENESS;
     gn_image8_finish(&shades);
-    run->has_place = ret == 1 && gn_chart_orient(&run->mean, &run->place) > LEAST_LIKENESS;
-    if (!run->has_place) {
-        by = "its grid";
-        ret = gn_chart_find(&run->mean, &run->place, out_error);
-        run->has_place = ret == 1;
+    if (is_found)
+        *out_place = place;
+    return is_found;
+}
+
+/* The channels' mean. */
+static int make_gray(const struct gn_image *image, struct gn_image *out)
+{
+    int err = gn_image_init(out, image->width, image->height, 1);
+    for (long i = 0; !err && i < (long)image->width * image->height; i++)
+        for (int c = 0; c < image->channels; c++)
+            out->data[i] += image->data[i * image->channels + c] / (float)image->channels;
+    return err;
+}
+
+/* OpenCV compares colours: under light of one band it takes a gray picture only. The grid of the
+ * patches does where it sees none, or is not in the build. */
+static int find_place(struct run *run, struct gn_error *out_error)
+{
+    struct gn_image gray = {0};
+    const char *by = "OpenCV";
+    int ret = 1;
+    if (!find_by_opencv(&run->mean, &run->place)) {
+        if (make_gray(&run->mean, &gray) < 0)
+            return gn_error_set(out_error, -ENOMEM, "out of memory");
+        if (!find_by_opencv(&gray, &run->place)) {
+            by = "its grid";
+            ret = gn_chart_find(&run->mean, &run->place, out_error);
+        }
+        gn_image_finish(&gray);
     }
-    if (ret < 0 && !run->has_place)
+    if (ret < 0)
         return ret;
-    if (!run->has_place)
+    if (ret == 0)
         return gn_error_set(out_error, -EDOM,
                             "the pictures show no colour chart that could be found; say where it "
                             "is with --corners (centres of the patches dark skin, bluish green, "
@@ -255,9 +276,9 @@ int gn_calibrate_chart(const struct gn_options *options, const struct gn_calibra
     int err = 0;
     if (model == GN_CURVE_LINEAR && !series->has_times)
         err = gn_error_set(out_error, -EINVAL, "--model linear needs --times");
-    if (!err)
+    bool is_given = get(&run, "corners");
+    if (!err && is_given)
         err = read_place(&run, out_error);
-    bool is_given = run.has_place;
     if (!err)
         err = make_mean(&run, out_error);
     if (!err && !is_given)

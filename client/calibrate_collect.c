@@ -13,6 +13,8 @@
 
 /** A board at rest: between two pictures its corners move by less, in diagonals of the picture. */
 #define MAX_MOTION 0.005
+/** Pictures in which another board is looked for. */
+#define MAX_SEARCHES 3
 
 void gn_calibrate_views_finish(struct gn_calibrate_views *set)
 {
@@ -22,6 +24,27 @@ void gn_calibrate_views_finish(struct gn_calibrate_views *set)
         free(set->names[v]);
     }
     memset(set, 0, sizeof(*set));
+}
+
+/* Looks whether the board has a square more each way: those who counted inner corners. A few times
+ * only, it takes as long as looking for the board. */
+static int look_for_larger(struct gn_calibrate_views *set, const struct gn_image8 *gray,
+                           struct gn_board_corner *found, struct gn_error *out_error)
+{
+    struct gn_board larger = set->board;
+    int n = 0;
+    larger.columns++;
+    larger.rows++;
+    if (set->board.is_charuco || set->n_views > 0 || set->hint[0] ||
+        set->n_searched == MAX_SEARCHES || gn_board_check(&larger, NULL) < 0)
+        return 0;
+    set->n_searched++;
+    int err = gn_board_find(&larger, gray->data, gray->width, gray->height, found, &n, out_error);
+    if (!err && n > 0)
+        snprintf(set->hint, sizeof(set->hint),
+                 "a board of %dx%d squares is seen, and --board counts squares, not inner corners",
+                 larger.columns, larger.rows);
+    return err;
 }
 
 int gn_calibrate_views_look(struct gn_calibrate_views *set, const char *name,
@@ -44,6 +67,8 @@ int gn_calibrate_views_look(struct gn_calibrate_views *set, const char *name,
     if (!err)
         err =
             gn_board_find(&set->board, gray.data, gray.width, gray.height, found, out_n, out_error);
+    if (!err && *out_n == 0)
+        err = look_for_larger(set, &gray, found, out_error);
     gn_image_finish(image);
     gn_image8_finish(&gray);
     return err;
@@ -99,7 +124,7 @@ static enum sight judge(const struct gn_calibrate_views *set, struct watch *w, i
 }
 
 /* Why nothing is taken: where that changed, and no faster than one can read. */
-static void tell(struct watch *w, enum sight sight, int like)
+static void tell(struct watch *w, enum sight sight, int like, const char *hint)
 {
     int64_t now_ns = gn_clock_get_monotonic_ns();
     if (sight == w->told || now_ns - w->told_ns < GN_NS_PER_S)
@@ -107,7 +132,7 @@ static void tell(struct watch *w, enum sight sight, int like)
     w->told = sight;
     w->told_ns = now_ns;
     if (sight == SIGHT_EMPTY)
-        printf("no board is seen\n");
+        printf("no board is seen%s%s\n", hint[0] ? ": " : "", hint);
     else if (sight == SIGHT_MOVING)
         printf("the board moves: hold it still\n");
     else
@@ -171,7 +196,7 @@ static int watch_once(struct gn_calibrate_views *set, struct watch *w, struct gn
         err = gn_calibrate_views_look(set, "picture", &image, w->found, &w->n_found, out_error);
     enum sight sight = err ? SIGHT_EMPTY : judge(set, w, &like);
     if (!err && sight != SIGHT_NEW)
-        tell(w, sight, like);
+        tell(w, sight, like, set->hint);
     if (!err && sight == SIGHT_NEW) {
         err = take_view(set, w, &picture, out_error);
         *out_is_done = !err && is_enough(set, w);

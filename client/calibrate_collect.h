@@ -25,6 +25,8 @@ struct gn_calibrate_views {
     char *names[GN_BOARD_MAX_VIEWS];                     // [n_views], owned
     int n_views;
     int width, height; // of all pictures
+    int n_searched;    // pictures without the board in which another was looked for
+    char hint[128];    // what they show instead; "": nothing that is known
 };
 
 void gn_calibrate_views_finish(struct gn_calibrate_views *set);

@@ -270,7 +270,7 @@ static int name_picture(struct work *w, double value, struct gn_error *out_error
     int n = w->folder ? snprintf(name, sizeof(name), "%s/exposure-%02d.png", w->folder, s->n + 1)
                       : snprintf(name, sizeof(name), "%g %s", value, get_unit(w));
     if (n < 0 || (size_t)n >= sizeof(name))
-        return gn_error_set(out_error, -ENAMETOOLONG, "--save: the folder's name is too long");
+        return gn_error_set(out_error, -ENAMETOOLONG, "--keep: the folder's name is too long");
     free(s->names[s->n]);
     s->names[s->n] = strdup(name);
     return s->names[s->n] ? 0 : gn_error_set(out_error, -ENOMEM, "out of memory");
@@ -404,7 +404,7 @@ static int write_times(const struct work *w, struct gn_error *out_error)
     fclose(out);
     int n = snprintf(path, sizeof(path), "%s/times.txt", w->folder);
     int err = n < 0 || (size_t)n >= sizeof(path)
-                  ? gn_error_set(out_error, -ENAMETOOLONG, "--save: the folder's name is too long")
+                  ? gn_error_set(out_error, -ENAMETOOLONG, "--keep: the folder's name is too long")
                   : gn_file_write(path, text, size, out_error);
     free(text);
     if (!err && w->is_8_bit)
@@ -422,7 +422,7 @@ int gn_calibrate_series_take(struct gn_calibrate_series *series, const struct gn
     struct plan plan;
     struct work w = {.series = series,
                      .program = program,
-                     .folder = gn_options_get_string(options, NULL, NULL, "save"),
+                     .folder = gn_options_get_string(options, NULL, NULL, "keep"),
                      .n_frames = DEFAULT_FRAMES,
                      .full_scale = gn_options_get_int(options, NULL, NULL, "full-scale"),
                      .is_8_bit = is_8_bit};
@@ -433,7 +433,7 @@ int gn_calibrate_series_take(struct gn_calibrate_series *series, const struct gn
     if (!err && !series->taken)
         err = gn_error_set(out_error, -ENOMEM, "out of memory");
     if (!err && w.folder)
-        err = gn_calibrate_make_folder("save", w.folder, out_error);
+        err = gn_calibrate_make_folder("keep", w.folder, out_error);
     gn_cmd_catch_signals();
     if (!err)
         err = gn_live_open(options, &(struct gn_live_options){.is_8_bit = is_8_bit}, &w.source,

@@ -22,6 +22,28 @@ int gn_cmd_calibrate_intrinsics(int argc, char *const argv[]);
 int gn_cmd_calibrate_response(int argc, char *const argv[]);
 int gn_cmd_calibrate_probe(int argc, char *const argv[]);
 
+/** Rows of the option tables that several of them have; help: what each does with it. */
+#define GN_CALIBRATE_OUT_OPTION(help_text)                                                         \
+    {                                                                                              \
+        .key = "out", .flag = "out", .type = GN_OPTION_STRING, .value_name = "FILE",               \
+        .is_required = true, .help = help_text                                                     \
+    }
+#define GN_CALIBRATE_PICTURE_OPTION(help_text)                                                     \
+    {                                                                                              \
+        .key = "picture", .flag = "picture", .type = GN_OPTION_STRING, .value_name = "FILE",       \
+        .help = help_text                                                                          \
+    }
+#define GN_CALIBRATE_FRAMES_OPTION(help_text)                                                      \
+    {                                                                                              \
+        .key = "frames", .flag = "frames", .type = GN_OPTION_INT, .min = 1, .max = 10000,          \
+        .value_name = "N", .help = help_text                                                       \
+    }
+#define GN_CALIBRATE_KEEP_OPTION(help_text)                                                        \
+    {                                                                                              \
+        .key = "keep", .flag = "keep", .type = GN_OPTION_STRING, .value_name = "DIR",              \
+        .help = help_text                                                                          \
+    }
+
 /** How codes of files become floats in [0, 1]. */
 struct gn_calibrate_format {
     int full_scale16;  // largest code of 16-bit files, 0: 65535

@@ -48,18 +48,10 @@ GN_MUST_USE int gn_calibrate_series_list(struct gn_calibrate_series *series, con
              "they are counts of a camera that counts lines. auto: the one it has now, then from " \
              "its shortest on, doubled until half the picture is clipped. What the camera says "   \
              "that it took counts. Its own settings are put back in the end."},                    \
-        {.key = "frames",                                                                          \
-         .flag = "frames",                                                                         \
-         .type = GN_OPTION_INT,                                                                    \
-         .min = 1,                                                                                 \
-         .max = 10000,                                                                             \
-         .value_name = "N",                                                                        \
-         .help = "Camera: pictures at each exposure, whose mean is taken; default 8."},            \
-    {                                                                                              \
-        .key = "save", .flag = "save", .type = GN_OPTION_STRING, .value_name = "DIR",              \
-        .help = "Camera: write the pictures to this new folder as PNG, and times.txt; they give "  \
-                "the same result again."                                                           \
-    }
+        GN_CALIBRATE_FRAMES_OPTION(                                                                \
+            "Camera: pictures at each exposure, whose mean is taken; default 8."),                 \
+        GN_CALIBRATE_KEEP_OPTION("Camera: write the pictures to this new folder as PNG, and "      \
+                                 "times.txt; they give the same result again.")
 
 /**
  * Takes the pictures from the camera that the options name, and says on stdout how far it is.

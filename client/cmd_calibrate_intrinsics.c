@@ -38,12 +38,8 @@ static const struct gn_option option_table[] = {
      .value_name = "N",
      .help = "Camera or video: end with so many views, each of the board at rest and other than "
              "all before; default 15. Ctrl-C ends with those that are there."},
-    {.key = "keep",
-     .flag = "keep",
-     .type = GN_OPTION_STRING,
-     .value_name = "DIR",
-     .help = "Camera or video: write the pictures of the views to this new folder, as PNG; --files "
-             "DIR then gives the same result again."},
+    GN_CALIBRATE_KEEP_OPTION("Camera or video: write the pictures of the views to this new folder, "
+                             "as PNG; --files DIR then gives the same result again."),
     {.key = "board",
      .flag = "board",
      .type = GN_OPTION_STRING,
@@ -85,18 +81,10 @@ static const struct gn_option option_table[] = {
      .default_value = "1",
      .value_name = "PX",
      .help = "Refuse a fit whose corners lie off by more (RMS)."},
-    {.key = "out",
-     .flag = "out",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .is_required = true,
-     .help = "camera.json; what else it says stays."},
-    {.key = "picture",
-     .flag = "picture",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .help = "A PNG of where corners were seen (blue) and of their errors (red, 50 times as long); "
-             "parts of the picture without corners are pink."},
+    GN_CALIBRATE_OUT_OPTION("camera.json; what else it says stays."),
+    GN_CALIBRATE_PICTURE_OPTION(
+        "A PNG of where corners were seen (blue) and of their errors (red, 50 times as long); "
+        "parts of the picture without corners are pink."),
 };
 
 static const struct gn_program program = {
@@ -259,6 +247,8 @@ static int calibrate(struct run *run, const struct gn_options *options, struct g
     if (!err)
         err = gn_views_check(run->set.views, run->set.n_views, run->set.width, run->set.height,
                              &figures, out_error);
+    if (err && run->set.n_views == 0 && run->set.hint[0])
+        gn_error_set(out_error, err, "%s", run->set.hint);
     if (!err)
         err = gn_intrinsics_solve(
             &run->set.board, run->set.views, run->set.n_views, run->set.width, run->set.height,

@@ -54,13 +54,9 @@ static const struct gn_option option_table[] = {
      .default_value = GN_BODY_WORLD,
      .value_name = "NAME",
      .help = "With --markers: which body."},
-    {.key = "out",
-     .flag = "out",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .is_required = true,
-     .help = "The SVG file. Its sizes are millimetres: print it at 100 %, not fitted to the page, "
-             "and measure the line at its foot."},
+    GN_CALIBRATE_OUT_OPTION(
+        "The SVG file. Its sizes are millimetres: print it at 100 %, not fitted "
+        "to the page, and measure the line at its foot."),
 };
 
 static const struct gn_program program = {

@@ -91,22 +91,14 @@ static const struct gn_option option_table[] = {
      .default_value = "true",
      .help = "Chart: fit the colour matrix, too. --no-matrix under coloured light, and where the "
              "camera's own is not to change."},
-    {.key = "out",
-     .flag = "out",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .is_required = true,
-     .help = "camera.json or probe.json; what else it says stays."},
+    GN_CALIBRATE_OUT_OPTION("camera.json or probe.json; what else it says stays."),
     {.key = "plot",
      .flag = "plot",
      .type = GN_OPTION_STRING,
      .value_name = "FILE",
      .help = "Chart: an SVG of how far each patch lies off."},
-    {.key = "picture",
-     .flag = "picture",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .help = "Chart: a PNG of where its patches are measured, dark skin crossed."},
+    GN_CALIBRATE_PICTURE_OPTION(
+        "Chart: a PNG of where its patches are measured, dark skin crossed."),
     {.key = "radiance",
      .flag = "radiance",
      .type = GN_OPTION_STRING,
@@ -126,7 +118,7 @@ static const struct gn_program program = {
         "      --out probe.json --plot residuals.svg\n"
         "  gnomon calibrate response --stack 'stack/*.jpg' \\\n"
         "      --times 1/60,1/30,1/15,1/8,1/4 --out probe.json\n"
-        "  gnomon calibrate response --gige any --exposures 4,0.25,1,16,64ms --save shots \\\n"
+        "  gnomon calibrate response --gige any --exposures 4,0.25,1,16,64ms --keep shots \\\n"
         "      --out probe.json --plot residuals.svg --picture found.png\n"
         "  gnomon calibrate response --v4l2 any --live stack --exposures auto --out probe.json\n",
     .options = option_table,
@@ -155,8 +147,8 @@ static const char *find_misuse(const struct gn_options *options)
     if (n_cameras && has(options, "bayer"))
         return "--bayer is for files; a camera's own mosaic is interpolated";
     if (!n_cameras && (has(options, "live") || has(options, "exposures") ||
-                       has(options, "frames") || has(options, "save")))
-        return "--live, --exposures, --frames and --save are for cameras, and none is named";
+                       has(options, "frames") || has(options, "keep")))
+        return "--live, --exposures, --frames and --keep are for cameras, and none is named";
     return NULL;
 }
 

@@ -364,6 +364,8 @@ def check_published_intrinsics():
         assert float(re.search(r'^error ([\d.]+) px RMS over', out, re.M).group(1)) < .3
         refuse('pictures show the board', 'intrinsics', '--files', pictures, '--board', '8x5', '--out',
                f.at('x.json'))
+        refuse('a board of 10x7 squares is seen, and --board counts squares', 'intrinsics', '--files', pictures,
+               '--board', '9x6', '--out', f.at('x.json'))
         refuse('4 pictures show the board', 'intrinsics', '--files',
                os.path.join(DATA, 'markers', 'opencv', 'left0[1245].jpg'), '--board', '10x7', '--out',
                f.at('x.json'))

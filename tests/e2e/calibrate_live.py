@@ -229,7 +229,7 @@ def test_chart():
         f.write('light.png', light_picture(draw_chart))
         with Camera(f.at('light.png'), 0, '--chunks', *CURVE) as camera:
             out = run(*response(f, '--exposures', '10,.01,.1,1,100,1000,10000ms', '--controls',
-                                'GainAuto=Continuous', '--save', f.at('shots')))
+                                'GainAuto=Continuous', '--keep', f.at('shots')))
         assert camera.get_settings() == (10000, 2), camera.said
         times = re.findall(r'^exposure (\d) of 7: (\S+) us: mean of 8, noise ([\d.]+) codes of 4095', out, re.M)
         assert [float(t) for _, t, _ in times] == [1e4, 10, 100, 1e3, 1e5, 1e6, 1e7], out
@@ -286,8 +286,8 @@ def test_response_ends():
                             (['--exposures', '1ms', '--bayer', 'rggb'], '--bayer is for files')):
             err = run(*response(f, *more), status=1)
             assert words in err, (more, err)
-        err = run('response', '--chart', 'x', '--save', 'y', '--out', f.at('probe.json'), status=1)
-        assert '--save are for cameras' in err, err
+        err = run('response', '--chart', 'x', '--keep', 'y', '--out', f.at('probe.json'), status=1)
+        assert '--keep are for cameras' in err, err
         assert os.listdir(f.path) == ['light.png']
 
 

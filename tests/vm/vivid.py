@@ -75,6 +75,8 @@ def write_script(address):
     script += 'step gain v4l2-ctl -d %s -C gain,brightness\n' % VIDEO
     script += control('bright', 'brightness=128')
     script += grab('no_control', 'YUYV', more=('exposure_absolute=3',))
+    script += 'step no_exposure %s\n' % quote(GNOMON, 'calibrate', 'response', '--v4l2', VIDEO, '--exposures',
+                                              '1,2,4ms', '--out', 'response.json')
     script += grab('no_size', 'YUYV', size='641x481')
     script += grab('no_rate', 'YUYV', rate=500)
     script += grab('no_format', 'MJPG')
@@ -215,6 +217,8 @@ def test_what_is_not_there_is_named():
                         ('no_format', ("no pixel format 'MJPG' that we read; it has Y16, Y12",))):
         err = Grabbed(name, status=3).err
         assert all(word in err for word in words) and VIDEO + ' (vivid): ' in err, err
+    status, out, err = machine.get('no_exposure')
+    assert status == 1 and VIDEO + ' (vivid): no exposure can be set; it has brightness, ' in err, out + err
 
 
 def test_view_gives_composites():
