@@ -9,8 +9,6 @@ enum { MAX_PLACES = 40, MIN_PLACES = 6, MAX_STEPS = 25 };
 
 /** Widest half of a profile, px, and its step. */
 static const double max_reach_px = 3.0, step_px = 0.25;
-/** Narrowest cell across whose edge a profile sees both sides, px. */
-static const double min_cell_px = 1.8;
 /** Least difference of linear light across an edge, of full scale. */
 static const double min_contrast = 0.02;
 
@@ -26,17 +24,6 @@ struct place {
     double offset;
     double normal[2];
 };
-
-static double sample(const struct gn_grey *g, double x, double y)
-{
-    double fx = floor(x - 0.5), fy = floor(y - 0.5);
-    double u = x - 0.5 - fx, v = y - 0.5 - fy;
-    const uint8_t *p = g->pixels + (long)fy * g->width + (long)fx;
-    const uint8_t *q = p + g->width;
-    const float *l = g->linear;
-    return (1 - v) * ((1 - u) * (double)l[p[0]] + u * (double)l[p[1]]) +
-           v * ((1 - u) * (double)l[q[0]] + u * (double)l[q[1]]);
-}
 
 static bool is_inside(const struct gn_grey *g, double x, double y, double margin)
 {
@@ -71,7 +58,7 @@ static int take_profile(const struct gn_grey *g, const double px[static 2],
     int n = (int)(2 * reach / step_px);
     for (int i = 0; i < n; i++) {
         double s = -reach + (i + 0.5) * (2 * reach / n);
-        out[i] = sample(g, px[0] + s * normal[0], px[1] + s * normal[1]);
+        out[i] = gn_grey_sample(g, px[0] + s * normal[0], px[1] + s * normal[1]);
     }
     return n;
 }
@@ -214,12 +201,9 @@ bool gn_edges_refine(const struct gn_grey *grey, const struct gn_camera *camera,
     memcpy(found, corners_px, sizeof(found));
     // The second round's profiles have the edge in their middle, the third's the same ends.
     for (int round = 0; round < 3; round++) {
-        for (int k = 0; k < 4; k++) {
-            const double *p = found[k], *q = found[(k + 1) % 4];
-            shortest = fmin(shortest, hypot(p[0] - q[0], p[1] - q[1]));
-        }
+        shortest = fmin(shortest, gn_quad_get_side(found));
         double reach = fmin(0.8 * shortest / cells, max_reach_px);
-        if (!(shortest / cells >= min_cell_px) || !refine_once(grey, camera, reach, found))
+        if (!(shortest / cells >= GN_EDGES_MIN_CELL_PX) || !refine_once(grey, camera, reach, found))
             return false;
     }
     for (int k = 0; k < 4; k++)

@@ -10,24 +10,20 @@
 #define GN_CLIENT_TRACK_EDGES_H
 
 #include <stdbool.h>
-#include <stdint.h>
 
+#include "client/track/quad.h"
 #include "common/camera.h"
 
-/** A grey picture and what its codes mean. Borrowed pixels. */
-struct gn_grey {
-    const uint8_t *pixels; // [height][width]
-    int width;
-    int height;
-    float linear[256]; // of each code
-};
+/** Narrowest cell across whose edge a profile sees both sides, px. */
+#define GN_EDGES_MIN_CELL_PX 1.8
 
 /**
  * Moves corners_px[4][2] (clockwise around a dark square on a light ground, each within about
  * 2 px) onto the edges of the square. cells: of its side, its border included; the border is one
  * cell wide. Each edge is measured across, by how much light is on either side, at many places
  * along what the lens makes of a straight line, and a straight line fitted to that. Returns false,
- * and leaves them, where cells are under 1.8 px wide or an edge is not seen well enough.
+ * and leaves them, where cells are under GN_EDGES_MIN_CELL_PX wide or an edge is not seen well
+ * enough.
  */
 bool gn_edges_refine(const struct gn_grey *grey, const struct gn_camera *camera, int cells,
                      double corners_px[4][2]);

@@ -8,22 +8,16 @@
 #define GN_CLIENT_TRACK_FOLLOW_H
 
 #include <stdbool.h>
-#include <stdint.h>
 
 #include "client/track/edges.h"
-
-/** What a marker looks like: white[cells][cells] from its own top left, 1: white. */
-struct gn_follow_pattern {
-    int cells;
-    const uint8_t *white; // borrowed
-};
+#include "client/track/pattern.h"
 
 /**
- * Moves corners_px, where the corners are expected, to where they are: within about 2 px. Returns
- * false where the edges are not there or more than a twentieth of the cells are not as they should
- * be.
+ * Moves corners_px, where the corners are expected, to where they are: within about 2 px, or half
+ * a cell of a small one. Returns false where the edges are not there, more than a twentieth of the
+ * cells are not as they should be, or a small one is not like its pattern.
  */
 bool gn_follow_marker(const struct gn_grey *grey, const struct gn_camera *camera,
-                      const struct gn_follow_pattern *pattern, double corners_px[4][2]);
+                      const struct gn_pattern *pattern, double corners_px[4][2]);
 
 #endif

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "client/track/normal.h"
 #include "client/track/rotation.h"
 #include "client/vision/markers.h"
 
@@ -129,39 +130,6 @@ static double sum_squares(const struct observation *obs, int n, const struct gn_
     return sum;
 }
 
-/** Cholesky of a (in place, lower); false where it is not positive definite. */
-static bool decompose(double a[6][6])
-{
-    for (int i = 0; i < 6; i++) {
-        for (int j = 0; j <= i; j++) {
-            double s = a[i][j];
-            for (int k = 0; k < j; k++)
-                s -= a[i][k] * a[j][k];
-            if (i > j)
-                a[i][j] = s / a[j][j];
-            else if (s > 1e-14 * fabs(a[i][i]) && isfinite(s))
-                a[i][i] = sqrt(s);
-            else
-                return false;
-        }
-    }
-    return true;
-}
-
-static void solve(double lower[6][6], double b[static 6])
-{
-    for (int i = 0; i < 6; i++) {
-        for (int k = 0; k < i; k++)
-            b[i] -= lower[i][k] * b[k];
-        b[i] /= lower[i][i];
-    }
-    for (int i = 5; i >= 0; i--) {
-        for (int k = i + 1; k < 6; k++)
-            b[i] -= lower[k][i] * b[k];
-        b[i] /= lower[i][i];
-    }
-}
-
 /** q = exp(w) q: a turn about the axes that the pose maps to. */
 static void step_pose(const struct gn_pose *from, const double step[static 6], struct gn_pose *out)
 {
@@ -188,8 +156,8 @@ static bool refine(const struct observation *obs, int n, double error_px, struct
             a[k][k] *= 1 + damping;
         struct gn_pose tried;
         double tried_sum = INFINITY;
-        if (decompose(a)) {
-            solve(a, step);
+        if (gn_normal_decompose(a[0], 6)) {
+            gn_normal_solve(a[0], 6, step);
             step_pose(&pose, step, &tried);
             tried_sum = sum_squares(obs, n, &tried, NULL, NULL);
         }
@@ -206,13 +174,13 @@ static bool refine(const struct observation *obs, int n, double error_px, struct
         if (is_end)
             break;
     }
-    if (!isfinite(sum) || gn_pose_normalize(&pose) < 0 || !decompose(jtj))
+    if (!isfinite(sum) || gn_pose_normalize(&pose) < 0 || !gn_normal_decompose(jtj[0], 6))
         return false;
     double variance[6];
     for (int k = 0; k < 6; k++) {
         double column[6] = {0};
         column[k] = 1;
-        solve(jtj, column);
+        gn_normal_solve(jtj[0], 6, column);
         variance[k] = column[k];
     }
     *fit = (struct gn_pose_fit){

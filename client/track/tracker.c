@@ -9,28 +9,12 @@
 #include <time.h>
 
 #include "client/track/axes.h"
-#include "client/track/edges.h"
-#include "client/track/follow.h"
 #include "client/track/grey.h"
 #include "client/track/pose_choice.h"
-#include "client/vision/markers.h"
 #include "common/jpeg.h"
-
-enum {
-    MAX_SIGHTINGS = 1024,
-    /** Where some markers are missing, the whole picture is searched again after so many. */
-    SEARCH_INTERVAL = 15,
-};
 
 /** Below these speeds of its answer a body counts as at rest, m/s and rad/s. */
 static const double rest_speed = 0.005, rest_turn = 0.02;
-
-/** A marker of the last picture. */
-struct followed {
-    struct gn_marker_sighting sighting;
-    double step[4][2]; // how its corners moved since the picture before, px
-    uint8_t white[GN_MARKER_MAX_CELLS * GN_MARKER_MAX_CELLS];
-};
 
 /** What is kept of each body from picture to picture. */
 struct memory {
@@ -44,18 +28,11 @@ struct gn_tracker {
     struct gn_camera camera;
     const struct gn_bodies *bodies; // borrowed
     bool is_raw;
-    int cells; // of a marker's side
-    struct gn_marker_finder *finder;
+    struct gn_watch *watch;
     struct gn_jpeg *jpeg;
     struct gn_image8 grey_picture;
     struct gn_grey grey; // the same pixels
     bool has_picture;
-    int since_whole; // pictures since all of one was searched
-    struct gn_marker_window window;
-    int n_sightings;
-    struct gn_marker_sighting sightings[MAX_SIGHTINGS];
-    int n_last;
-    struct followed last[MAX_SIGHTINGS], next[MAX_SIGHTINGS];
     struct memory memory[GN_BODY_MAX_BODIES];
     struct gn_tracked_body tracked[GN_BODY_MAX_BODIES];
     double (*points)[3]; // [GN_BODY_MAX_MARKERS * 4], as are:
@@ -93,9 +70,7 @@ int gn_tracker_create(const struct gn_tracker_options *options, struct gn_tracke
     bool is_unset = memcmp(&options->filter, &unset, sizeof(unset)) == 0;
     for (int i = 0; i < GN_BODY_MAX_BODIES; i++)
         t->memory[i].filter.options = is_unset ? GN_POSE_FILTER_DEFAULTS : options->filter;
-    const struct gn_marker_finder_options finder = {.dictionary = t->bodies->dictionary,
-                                                    .refinement = GN_MARKER_REFINE_NONE};
-    int err = gn_marker_finder_create(&finder, &t->finder, out_error);
+    int err = gn_watch_create(&t->camera, t->bodies, &t->watch, out_error);
     t->points = calloc(GN_BODY_MAX_MARKERS * 4, sizeof(*t->points));
     t->seen = calloc(GN_BODY_MAX_MARKERS * 4, sizeof(*t->seen));
     if (!err && (!t->points || !t->seen || gn_jpeg_create(&t->jpeg) < 0 ||
@@ -105,9 +80,6 @@ int gn_tracker_create(const struct gn_tracker_options *options, struct gn_tracke
         gn_tracker_destroy(&t);
         return err;
     }
-    uint8_t cells[GN_MARKER_MAX_CELLS * GN_MARKER_MAX_CELLS];
-    t->cells = gn_marker_get_cells(t->bodies->dictionary, 0, cells);
-    t->since_whole = SEARCH_INTERVAL;
     set_linear(t);
     *out_tracker = t;
     return 0;
@@ -118,147 +90,13 @@ void gn_tracker_destroy(struct gn_tracker **tracker)
     struct gn_tracker *t = *tracker;
     if (!t)
         return;
-    gn_marker_finder_destroy(&t->finder);
+    gn_watch_destroy(&t->watch);
     gn_jpeg_destroy(&t->jpeg);
     gn_image8_finish(&t->grey_picture);
     free(t->points);
     free(t->seen);
     free(t);
     *tracker = NULL;
-}
-
-/** Keeps the sightings of the bodies' own markers; one that is seen twice tells nothing. */
-static void sort_out(struct gn_tracker *t)
-{
-    int n = 0, body, marker;
-    for (int i = 0; i < t->n_sightings; i++) {
-        bool is_alone = gn_bodies_find_marker(t->bodies, t->sightings[i].id, &body, &marker);
-        for (int k = 0; k < t->n_sightings && is_alone; k++)
-            is_alone = k == i || t->sightings[k].id != t->sightings[i].id;
-        // Marked first, moved later: the others are still compared with it.
-        t->sightings[i].corners[0][0] = is_alone ? t->sightings[i].corners[0][0] : NAN;
-    }
-    for (int i = 0; i < t->n_sightings; i++)
-        if (!isnan(t->sightings[i].corners[0][0]))
-            t->sightings[n++] = t->sightings[i];
-    t->n_sightings = n;
-}
-
-static int search(struct gn_tracker *t, const struct gn_marker_window *window,
-                  struct gn_error *out_error)
-{
-    int err =
-        gn_marker_finder_find(t->finder, t->grey.pixels, t->grey.width, t->grey.height, window,
-                              MAX_SIGHTINGS, t->sightings, &t->n_sightings, out_error);
-    if (!err)
-        sort_out(t);
-    return err;
-}
-
-/** The surroundings of all that was seen: half a marker and more around. */
-static void set_window(struct gn_tracker *t)
-{
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, side = 0;
-    for (int i = 0; i < t->n_sightings; i++) {
-        double(*c)[2] = t->sightings[i].corners;
-        for (int k = 0; k < 4; k++) {
-            for (int a = 0; a < 2; a++) {
-                low[a] = fmin(low[a], c[k][a]);
-                high[a] = fmax(high[a], c[k][a]);
-            }
-            side = fmax(side, hypot(c[k][0] - c[(k + 1) % 4][0], c[k][1] - c[(k + 1) % 4][1]));
-        }
-    }
-    double around = 16 + 0.6 * side;
-    t->window = (struct gn_marker_window){.x = (int)(low[0] - around),
-                                          .y = (int)(low[1] - around),
-                                          .width = (int)(high[0] - low[0] + 2 * around),
-                                          .height = (int)(high[1] - low[1] + 2 * around)};
-}
-
-/** Follows every marker of the last picture. False where one is not where it should be. */
-static bool follow_markers(struct gn_tracker *t)
-{
-    for (int i = 0; i < t->n_last; i++) {
-        struct gn_marker_sighting *s = &t->sightings[i];
-        const struct followed *f = &t->last[i];
-        const struct gn_follow_pattern pattern = {.cells = t->cells, .white = f->white};
-        *s = f->sighting;
-        for (int k = 0; k < 4; k++)
-            for (int a = 0; a < 2; a++)
-                s->corners[k][a] += f->step[k][a];
-        if (!gn_follow_marker(&t->grey, &t->camera, &pattern, s->corners))
-            return false;
-    }
-    t->n_sightings = t->n_last;
-    return t->n_last > 0;
-}
-
-/** Searches near where the last picture had markers, and everywhere where that finds fewer. */
-static int search_markers(struct gn_tracker *t, bool is_near, struct gn_error *out_error)
-{
-    int err = 0;
-    t->n_sightings = 0;
-    if (is_near)
-        err = search(t, &t->window, out_error);
-    if (!err && (!is_near || t->n_sightings < t->n_last)) {
-        err = search(t, NULL, out_error);
-        t->since_whole = 0;
-        t->counts.n_searched_whole++;
-    }
-    for (int i = 0; i < t->n_sightings && !err; i++) {
-        if (!gn_edges_refine(&t->grey, &t->camera, t->cells, t->sightings[i].corners)) {
-            gn_edges_widen(t->sightings[i].corners, 0.5);
-            t->counts.n_coarse_corners++;
-        }
-    }
-    return err;
-}
-
-/** Keeps the sightings for following them into the next picture. */
-static void remember(struct gn_tracker *t)
-{
-    struct followed *next = t->next;
-    for (int i = 0; i < t->n_sightings; i++) {
-        const struct followed *before = NULL;
-        for (int k = 0; k < t->n_last && !before; k++)
-            if (t->last[k].sighting.id == t->sightings[i].id)
-                before = &t->last[k];
-        next[i] = (struct followed){.sighting = t->sightings[i]};
-        if (!before) {
-            (void)gn_marker_get_cells(t->bodies->dictionary, t->sightings[i].id, next[i].white);
-            continue;
-        }
-        memcpy(next[i].white, before->white, sizeof(next[i].white));
-        for (int k = 0; k < 8; k++)
-            next[i].step[k / 2][k % 2] =
-                t->sightings[i].corners[k / 2][k % 2] - before->sighting.corners[k / 2][k % 2];
-    }
-    memcpy(t->last, next, (size_t)t->n_sightings * sizeof(*next));
-    t->n_last = t->n_sightings;
-    if (t->n_last > 0)
-        set_window(t);
-}
-
-/**
- * Finds the markers: follows those of the last picture; else searches near them; else everywhere,
- * as now and then where some of the bodies' markers have been missing.
- */
-static int find_markers(struct gn_tracker *t, struct gn_error *out_error)
-{
-    int n_known = 0, err = 0;
-    for (int i = 0; i < t->bodies->n_bodies; i++)
-        n_known += t->bodies->bodies[i].n_markers;
-    bool is_near = t->n_last > 0 && (t->n_last == n_known || t->since_whole < SEARCH_INTERVAL);
-    t->since_whole++;
-    if (is_near && follow_markers(t))
-        t->counts.n_followed++;
-    else
-        err = search_markers(t, is_near, out_error);
-    if (err)
-        t->n_sightings = 0;
-    remember(t);
-    return err;
 }
 
 static double get_length(const double v[static 3])
@@ -327,14 +165,15 @@ static int fit_body(struct gn_tracker *t, int body, int64_t time_ns, struct gn_e
 {
     struct gn_tracked_body *b = &t->tracked[body];
     const struct gn_body *known = &t->bodies->bodies[body];
-    int n = 0, owner, marker;
+    int n = 0, owner, marker, n_seen;
+    const struct gn_marker_sighting *seen = gn_watch_get_sightings(t->watch, &n_seen);
     *b = (struct gn_tracked_body){0};
-    for (int i = 0; i < t->n_sightings && n < GN_BODY_MAX_MARKERS * 4; i++) {
-        if (!gn_bodies_find_marker(t->bodies, t->sightings[i].id, &owner, &marker) || owner != body)
+    for (int i = 0; i < n_seen && n < GN_BODY_MAX_MARKERS * 4; i++) {
+        if (!gn_bodies_find_marker(t->bodies, seen[i].id, &owner, &marker) || owner != body)
             continue;
         for (int k = 0; k < 4; k++, n++) {
             memcpy(t->points[n], known->markers[marker].corners_body[k], sizeof(t->points[n]));
-            memcpy(t->seen[n], t->sightings[i].corners[k], sizeof(t->seen[n]));
+            memcpy(t->seen[n], seen[i].corners[k], sizeof(t->seen[n]));
         }
     }
     struct gn_pose_fit fits[2];
@@ -366,7 +205,7 @@ int gn_tracker_update(struct gn_tracker *t, const struct gn_capture *capture, in
     if (err)
         return err;
     t->has_picture = true;
-    err = find_markers(t, out_error);
+    err = gn_watch_update(t->watch, &t->grey, time_ns, out_error);
     for (int i = 0; i < t->bodies->n_bodies && err >= 0; i++) {
         err = fit_body(t, i, time_ns, out_error);
         n_seen += err > 0;
@@ -402,6 +241,7 @@ bool gn_tracker_get_between(const struct gn_tracker *t, int base, int body,
 void gn_tracker_get_counts(const struct gn_tracker *t, struct gn_tracker_counts *out)
 {
     *out = t->counts;
+    gn_watch_get_counts(t->watch, &out->markers);
 }
 
 /** How far the body's first corners are from its origin: as long its axes are drawn. */
@@ -425,10 +265,11 @@ int gn_tracker_draw(const struct gn_tracker *t, struct gn_image8 *out_rgb)
     size_t n = (size_t)t->grey.width * (size_t)t->grey.height;
     for (size_t i = 0; i < 3 * n; i++)
         out_rgb->data[i] = t->grey.pixels[i / 3];
-    for (int i = 0; i < t->n_sightings; i++)
+    int n_seen;
+    const struct gn_marker_sighting *seen = gn_watch_get_sightings(t->watch, &n_seen);
+    for (int i = 0; i < n_seen; i++)
         for (int k = 0; k < 4; k++)
-            gn_axes_draw_line(out_rgb, t->sightings[i].corners[k],
-                              t->sightings[i].corners[(k + 1) % 4], outline);
+            gn_axes_draw_line(out_rgb, seen[i].corners[k], seen[i].corners[(k + 1) % 4], outline);
     for (int i = 0; i < t->bodies->n_bodies; i++)
         if (t->tracked[i].is_seen)
             gn_axes_draw(out_rgb, &t->camera, &t->tracked[i].camera_from_body,

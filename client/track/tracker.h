@@ -15,6 +15,7 @@
 #include "client/track/bodies.h"
 #include "client/track/pose_filter.h"
 #include "client/track/pose_fit.h"
+#include "client/track/watch.h"
 #include "common/camera.h"
 #include "common/error.h"
 #include "common/image.h"
@@ -42,10 +43,8 @@ struct gn_tracked_body {
 /** What a tracker has counted. */
 struct gn_tracker_counts {
     uint64_t n_pictures;
-    uint64_t n_seen;           // body times picture
-    uint64_t n_followed;       // pictures that were not searched: see follow.h
-    uint64_t n_searched_whole; // pictures in which more than the bodies' surroundings was searched
-    uint64_t n_coarse_corners; // markers whose edges could not be refined: OpenCV's corners
+    uint64_t n_seen; // body times picture
+    struct gn_watch_counts markers;
     uint64_t n_flips_rejected; // see pose_choice.h
     uint64_t n_flips_corrected;
     uint64_t n_rest;         // steps from picture to picture at rest, over which:

@@ -10,6 +10,7 @@
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "client/vision/guard.hpp"
 #include "common/image.h"
@@ -30,6 +31,7 @@ cv::Ptr<cv::aruco::DetectorParameters> make_parameters(gn_marker_refinement refi
     // Finer than OpenCV's own: cells of 3 px are read, which it misses.
     p->perspectiveRemovePixelPerCell = 8;
     p->perspectiveRemoveIgnoredMarginPerCell = 0.33;
+    p->minDistanceToBorder = 0; // what the picture's border cuts off is not read anyway
     switch (refinement) {
     case GN_MARKER_REFINE_NONE:
         p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
@@ -47,14 +49,40 @@ cv::Ptr<cv::aruco::DetectorParameters> make_parameters(gn_marker_refinement refi
     return p;
 }
 
+// In a picture at twice its size: the one window that leaves least of the pixels' own stairs and
+// tells cells of 3 px apart; corners rounded off by the enlargement; neighbours on a cube.
+void look_closely(cv::aruco::DetectorParameters &p)
+{
+    p.adaptiveThreshWinSizeMin = p.adaptiveThreshWinSizeMax = 7;
+    p.polygonalApproxAccuracyRate = 0.08;
+    p.minMarkerDistanceRate = 0.02;
+}
+
 } // namespace
 
 struct gn_marker_finder {
     cv::Ptr<cv::aruco::Dictionary> dictionary;
     cv::Ptr<cv::aruco::DetectorParameters> parameters;
-    std::vector<std::vector<cv::Point2f>> corners;
+    std::vector<std::vector<cv::Point2f>> corners, unread;
     std::vector<int> ids;
+    cv::Mat enlarged;
+    cv::Point origin; // of the searched part
+    double scale;     // by which it is enlarged
 };
+
+namespace {
+
+// OpenCV's pixel centres are at whole numbers, of the enlarged picture too.
+void place(const gn_marker_finder &finder, const std::vector<cv::Point2f> &corners,
+           double (*out_px)[2])
+{
+    for (size_t k = 0; k < 4; k++) {
+        out_px[k][0] = (double(corners[k].x) + 0.5) / finder.scale + finder.origin.x;
+        out_px[k][1] = (double(corners[k].y) + 0.5) / finder.scale + finder.origin.y;
+    }
+}
+
+} // namespace
 
 const char *gn_vision_get_version(void)
 {
@@ -90,6 +118,9 @@ int gn_marker_finder_create(const struct gn_marker_finder_options *options,
         auto finder = std::make_unique<gn_marker_finder>();
         finder->dictionary = cv::aruco::getPredefinedDictionary(o.dictionary);
         finder->parameters = make_parameters(o.refinement);
+        finder->scale = o.is_small ? 2 : 1;
+        if (o.is_small)
+            look_closely(*finder->parameters);
         *out_finder = finder.release();
         return 0;
     });
@@ -112,29 +143,41 @@ int gn_marker_finder_find(struct gn_marker_finder *finder, const uint8_t *grey, 
     return gn_vision_guard(out_error, "looking for markers", [&] {
         // OpenCV only reads it, but knows no pictures of const pixels.
         const cv::Mat picture(height, width, CV_8UC1, const_cast<uint8_t *>(grey));
-        cv::Rect all(0, 0, width, height), part = all;
+        cv::Rect part(0, 0, width, height);
         if (window)
             part &= cv::Rect(window->x, window->y, window->width, window->height);
         *out_n_sightings = 0;
-        if (part.empty())
-            return 0;
         finder->corners.clear();
         finder->ids.clear();
-        cv::aruco::detectMarkers(picture(part), finder->dictionary, finder->corners, finder->ids,
-                                 finder->parameters);
+        finder->unread.clear();
+        finder->origin = part.tl();
+        if (part.empty())
+            return 0;
+        cv::Mat searched = picture(part);
+        if (finder->scale > 1) {
+            cv::resize(searched, finder->enlarged, {}, finder->scale, finder->scale,
+                       cv::INTER_LINEAR);
+            searched = finder->enlarged;
+        }
+        cv::aruco::detectMarkers(searched, finder->dictionary, finder->corners, finder->ids,
+                                 finder->parameters, finder->unread);
         int n = static_cast<int>(std::min<size_t>(finder->ids.size(), size_t(max_sightings)));
         for (int i = 0; i < n; i++) {
             out_sightings[i].id = finder->ids[size_t(i)];
-            for (size_t k = 0; k < 4; k++) {
-                const cv::Point2f &p = finder->corners[size_t(i)][k];
-                // OpenCV's pixel centres are at whole numbers.
-                out_sightings[i].corners[k][0] = double(p.x) + part.x + 0.5;
-                out_sightings[i].corners[k][1] = double(p.y) + part.y + 0.5;
-            }
+            place(*finder, finder->corners[size_t(i)], out_sightings[i].corners);
         }
         *out_n_sightings = n;
         return 0;
     });
+}
+
+int gn_marker_finder_get_unread(const struct gn_marker_finder *finder, int max_quads,
+                                double (*out_quads)[4][2])
+{
+    int n = static_cast<int>(std::min<size_t>(finder->unread.size(), size_t(max_quads)));
+    for (int i = 0; i < n; i++)
+        place(*finder, finder->unread[size_t(i)], out_quads[i]);
+    return n;
 }
 
 int gn_marker_get_cells(int dictionary, int id, uint8_t *out_cells)

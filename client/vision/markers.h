@@ -55,6 +55,7 @@ struct gn_marker_window {
 struct gn_marker_finder_options {
     int dictionary; // index into GN_MARKER_DICTIONARIES
     enum gn_marker_refinement refinement;
+    bool is_small; // looks for cells of 1.2 to 4 px, in the picture at twice its size
 };
 
 /** Thread-safety: unsafe; OpenCV is kept to one thread. */
@@ -81,6 +82,13 @@ GN_MUST_USE int gn_marker_finder_find(struct gn_marker_finder *finder, const uin
                                       int width, int height, const struct gn_marker_window *window,
                                       int max_sightings, struct gn_marker_sighting *out_sightings,
                                       int *out_n_sightings, struct gn_error *out_error);
+
+/**
+ * Squares that could be markers and were not read in the last search, at most max_quads, corners
+ * clockwise from any. Returns how many.
+ */
+int gn_marker_finder_get_unread(const struct gn_marker_finder *finder, int max_quads,
+                                double (*out_quads)[4][2]);
 
 /**
  * A marker's cells from its top left, 1: white, its black border included. out_cells has

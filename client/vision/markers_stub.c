@@ -51,6 +51,13 @@ int gn_marker_finder_find(struct gn_marker_finder *finder, const uint8_t *grey, 
     return refuse(out_error);
 }
 
+int gn_marker_finder_get_unread(const struct gn_marker_finder *finder, int max_quads,
+                                double (*out_quads)[4][2])
+{
+    (void)finder, (void)max_quads, (void)out_quads;
+    return 0;
+}
+
 int gn_marker_get_cells(int dictionary, int id, uint8_t *out_cells)
 {
     (void)dictionary, (void)id, (void)out_cells;

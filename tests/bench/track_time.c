@@ -94,7 +94,8 @@ static void measure(int row, const struct gn_rig_marker_camera *rig, int n_frame
     struct gn_bench_timing t = gn_bench_sum_up(&times);
     printf("%-28s %6.2f ms (IQR %.2f), %llu of %llu seen, %llu searched whole\n", rows[row].name,
            t.median, t.iqr, (unsigned long long)counts.n_seen,
-           (unsigned long long)counts.n_pictures, (unsigned long long)counts.n_searched_whole);
+           (unsigned long long)counts.n_pictures,
+           (unsigned long long)counts.markers.n_searched_whole);
     for (int i = 0; i < N_SHOTS; i++) {
         gn_image8_finish(&shots[i]);
         free(files[i]);

@@ -208,7 +208,7 @@ static void judge_stills(const char *text, const struct gn_bodies *bodies, int n
                   text, e->n, n, 1e3 * get_median(e->m, e->n),
                   1e3 * get_median(e->expected_m, e->n), get_median(e->rad, e->n) / degree,
                   1e3 * get_median(e->camera_m, e->n), 1e3 * e->m[e->n - 1],
-                  (int)counts.n_coarse_corners);
+                  (int)counts.markers.n_coarse_corners);
     gn_tracker_destroy(&tracker);
 }
 

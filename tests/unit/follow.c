@@ -61,7 +61,7 @@ static void follows_what_is_there(void **state)
 {
     (void)state;
     uint8_t *pixels = malloc(WIDTH * HEIGHT);
-    const struct gn_follow_pattern pattern = {CELLS, white};
+    const struct gn_pattern pattern = {CELLS, white};
     struct gn_camera camera = get_camera();
     for (int i = 0; i < 20; i++) {
         double x = 70.3 + 0.1 * i, y = 50.9 - 0.07 * i, corners[4][2];
@@ -82,7 +82,7 @@ static void refuses_another_marker_and_none(void **state)
 {
     (void)state;
     uint8_t *pixels = malloc(WIDTH * HEIGHT), other[CELLS * CELLS];
-    const struct gn_follow_pattern pattern = {CELLS, white};
+    const struct gn_pattern pattern = {CELLS, white};
     struct gn_camera camera = get_camera();
     double corners[4][2], before[4][2];
     // The same one a quarter turned.

@@ -1,0 +1,54 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * Markers searched for in a picture: OpenCV's squares, its and our own reading of them, corners
+ * below a pixel; where markers that are looked for are missing, small ones too.
+ */
+#ifndef GN_CLIENT_TRACK_SEARCH_H
+#define GN_CLIENT_TRACK_SEARCH_H
+
+#include "client/track/edges.h"
+#include "client/track/reader.h"
+#include "client/vision/markers.h"
+
+/** Most markers in a picture. */
+#define GN_SEARCH_MAX_FOUND 1024
+
+struct gn_search_options {
+    const struct gn_camera *camera; // borrowed until the search is destroyed
+    int dictionary;                 // index into GN_MARKER_DICTIONARIES
+    const int *ids;                 // those looked for; copied
+    int n_ids;
+};
+
+/** What is in a picture. */
+struct gn_search_finds {
+    int n_found;
+    int n_coarse; // whose corners are OpenCV's, good to half a pixel
+    struct gn_marker_sighting found[GN_SEARCH_MAX_FOUND];
+};
+
+/** Thread-safety: unsafe. */
+struct gn_search;
+
+/** Returns 0, -ENOSYS (no OpenCV), -EINVAL (no such dictionary), -ENOMEM or -EIO, and a sentence.
+ */
+GN_MUST_USE int gn_search_create(const struct gn_search_options *options,
+                                 struct gn_search **out_search, struct gn_error *out_error);
+/** NULL-safe; nulls *search. */
+void gn_search_destroy(struct gn_search **search);
+
+/**
+ * Finds the dictionary's markers in window (NULL: everywhere) of a picture of the camera's: each
+ * once, but an id as often as it is there. Ids that are not looked for are found where OpenCV
+ * reads them. with_small: looks closer where not all ids are found, for cells from 3 px down to 1.2
+ * px, at three times the cost. Returns 0, or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_search_find(struct gn_search *search, const struct gn_grey *grey,
+                               const struct gn_marker_window *window, bool with_small,
+                               struct gn_search_finds *out_finds, struct gn_error *out_error);
+
+/** What a marker that is looked for looks like. NULL: it is not. */
+const struct gn_pattern *gn_search_get_pattern(const struct gn_search *search, int id);
+
+#endif

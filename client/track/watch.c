@@ -1,0 +1,236 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+#include "client/track/watch.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/track/follow.h"
+
+enum {
+    /** Where some markers are missing, the whole picture is searched again after so many. */
+    SEARCH_INTERVAL = 15,
+    MAX_STRANGERS = 16,
+};
+
+/** Between two looks for small markers while nothing is seen, ns. */
+static const int64_t small_interval_ns = 100 * 1000 * 1000;
+
+/** A marker of the last picture. */
+struct followed {
+    struct gn_marker_sighting sighting;
+    double step[4][2]; // how its corners moved since the picture before, px
+};
+
+struct gn_watch {
+    const struct gn_camera *camera; // borrowed, as are:
+    const struct gn_bodies *bodies;
+    int n_known; // the bodies' markers
+    struct gn_search *search;
+    struct gn_search_finds finds;
+    int since_whole; // pictures since all of one was searched
+    bool with_small; // in this picture
+    int64_t last_small_ns;
+    struct gn_marker_window window;
+    int n_last;
+    struct followed last[GN_SEARCH_MAX_FOUND], next[GN_SEARCH_MAX_FOUND];
+    int n_strangers;
+    int strangers[MAX_STRANGERS];
+    struct gn_watch_counts counts;
+};
+
+int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodies,
+                    struct gn_watch **out_watch, struct gn_error *out_error)
+{
+    *out_watch = NULL;
+    struct gn_watch *w = calloc(1, sizeof(*w));
+    int n = 0;
+    for (int i = 0; i < bodies->n_bodies; i++)
+        n += bodies->bodies[i].n_markers;
+    int *ids = calloc((size_t)n + 1, sizeof(*ids));
+    int err = w && ids ? 0 : gn_error_set(out_error, -ENOMEM, "out of memory");
+    if (!err) {
+        for (int i = 0; i < bodies->n_bodies; i++)
+            for (int k = 0; k < bodies->bodies[i].n_markers; k++)
+                ids[w->n_known++] = bodies->bodies[i].markers[k].id;
+        const struct gn_search_options wanted = {
+            .camera = camera, .dictionary = bodies->dictionary, .ids = ids, .n_ids = n};
+        w->camera = camera;
+        w->bodies = bodies;
+        w->since_whole = SEARCH_INTERVAL;
+        err = gn_search_create(&wanted, &w->search, out_error);
+    }
+    free(ids);
+    if (err)
+        gn_watch_destroy(&w);
+    *out_watch = w;
+    return err;
+}
+
+void gn_watch_destroy(struct gn_watch **watch)
+{
+    if (*watch)
+        gn_search_destroy(&(*watch)->search);
+    free(*watch);
+    *watch = NULL;
+}
+
+static void note_stranger(struct gn_watch *w, int id)
+{
+    for (int i = 0; i < w->n_strangers; i++)
+        if (w->strangers[i] == id)
+            return;
+    if (w->n_strangers < MAX_STRANGERS)
+        w->strangers[w->n_strangers++] = id;
+}
+
+/** Keeps the sightings of the bodies' own markers; one that is seen twice tells nothing. */
+static void sort_out(struct gn_watch *w)
+{
+    struct gn_marker_sighting *found = w->finds.found;
+    int n = 0, body, marker;
+    for (int i = 0; i < w->finds.n_found; i++) {
+        bool is_own = gn_bodies_find_marker(w->bodies, found[i].id, &body, &marker);
+        bool is_alone = is_own;
+        if (!is_own)
+            note_stranger(w, found[i].id);
+        for (int k = 0; k < w->finds.n_found && is_alone; k++)
+            is_alone = k == i || found[k].id != found[i].id;
+        // Marked first, moved later: the others are still compared with it.
+        found[i].corners[0][0] = is_alone ? found[i].corners[0][0] : NAN;
+    }
+    for (int i = 0; i < w->finds.n_found; i++)
+        if (!isnan(found[i].corners[0][0]))
+            found[n++] = found[i];
+    w->finds.n_found = n;
+}
+
+static int search(struct gn_watch *w, const struct gn_grey *grey,
+                  const struct gn_marker_window *window, struct gn_error *out_error)
+{
+    int err = gn_search_find(w->search, grey, window, w->with_small, &w->finds, out_error);
+    if (!window)
+        w->n_strangers = 0;
+    if (err)
+        return err;
+    w->counts.n_coarse_corners += (uint64_t)w->finds.n_coarse;
+    sort_out(w);
+    return 0;
+}
+
+/** The surroundings of all that was seen: half a marker and more around. */
+static void set_window(struct gn_watch *w)
+{
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, side = 0;
+    for (int i = 0; i < w->finds.n_found; i++) {
+        double(*c)[2] = w->finds.found[i].corners;
+        for (int k = 0; k < 4; k++) {
+            for (int a = 0; a < 2; a++) {
+                low[a] = fmin(low[a], c[k][a]);
+                high[a] = fmax(high[a], c[k][a]);
+            }
+            side = fmax(side, hypot(c[k][0] - c[(k + 1) % 4][0], c[k][1] - c[(k + 1) % 4][1]));
+        }
+    }
+    double around = 16 + 0.6 * side;
+    w->window = (struct gn_marker_window){.x = (int)(low[0] - around),
+                                          .y = (int)(low[1] - around),
+                                          .width = (int)(high[0] - low[0] + 2 * around),
+                                          .height = (int)(high[1] - low[1] + 2 * around)};
+}
+
+/** Follows every marker of the last picture. False where one is not where it should be. */
+static bool follow(struct gn_watch *w, const struct gn_grey *grey)
+{
+    for (int i = 0; i < w->n_last; i++) {
+        struct gn_marker_sighting *s = &w->finds.found[i];
+        *s = w->last[i].sighting;
+        for (int k = 0; k < 8; k++)
+            s->corners[k / 2][k % 2] += w->last[i].step[k / 2][k % 2];
+        if (!gn_follow_marker(grey, w->camera, gn_search_get_pattern(w->search, s->id), s->corners))
+            return false;
+    }
+    w->finds.n_found = w->n_last;
+    return w->n_last > 0;
+}
+
+/** Whether it is time to look for small markers. */
+static bool is_small_due(struct gn_watch *w, int64_t time_ns)
+{
+    int64_t since_ns = time_ns - w->last_small_ns;
+    bool is_first = w->counts.n_searched_whole == 0;
+    if (w->n_last == 0 && !is_first && since_ns >= 0 && since_ns < small_interval_ns)
+        return false;
+    w->last_small_ns = time_ns;
+    return true;
+}
+
+/** Searches near where the last picture had markers, and everywhere where that finds fewer. */
+static int search_again(struct gn_watch *w, const struct gn_grey *grey, bool is_near,
+                        struct gn_error *out_error)
+{
+    int err = is_near ? search(w, grey, &w->window, out_error) : 0;
+    if (err || (is_near && w->finds.n_found >= w->n_last))
+        return err;
+    w->since_whole = 0;
+    w->counts.n_searched_whole++;
+    return search(w, grey, NULL, out_error);
+}
+
+/** Keeps the sightings for following them into the next picture. */
+static void remember(struct gn_watch *w)
+{
+    struct followed *next = w->next;
+    for (int i = 0; i < w->finds.n_found; i++) {
+        next[i] = (struct followed){.sighting = w->finds.found[i]};
+        const struct followed *before = NULL;
+        for (int k = 0; k < w->n_last && !before; k++)
+            if (w->last[k].sighting.id == next[i].sighting.id)
+                before = &w->last[k];
+        for (int k = 0; k < 8 && before; k++)
+            next[i].step[k / 2][k % 2] =
+                next[i].sighting.corners[k / 2][k % 2] - before->sighting.corners[k / 2][k % 2];
+    }
+    w->n_last = w->finds.n_found;
+    memcpy(w->last, next, (size_t)w->n_last * sizeof(*next));
+    if (w->n_last > 0)
+        set_window(w);
+}
+
+int gn_watch_update(struct gn_watch *w, const struct gn_grey *grey, int64_t time_ns,
+                    struct gn_error *out_error)
+{
+    int err = 0;
+    bool is_near = w->n_last > 0 && (w->n_last == w->n_known || w->since_whole < SEARCH_INTERVAL);
+    w->since_whole++;
+    if (is_near && follow(w, grey)) {
+        w->counts.n_followed++;
+    } else {
+        w->with_small = is_small_due(w, time_ns);
+        err = search_again(w, grey, is_near, out_error);
+    }
+    if (err)
+        w->finds.n_found = 0;
+    remember(w);
+    return err;
+}
+
+const struct gn_marker_sighting *gn_watch_get_sightings(const struct gn_watch *w, int *out_n)
+{
+    *out_n = w->finds.n_found;
+    return w->finds.found;
+}
+
+int gn_watch_get_strangers(const struct gn_watch *w, int max, int *out_ids)
+{
+    int n = w->n_strangers < max ? w->n_strangers : max;
+    memcpy(out_ids, w->strangers, (size_t)n * sizeof(*out_ids));
+    return n;
+}
+
+void gn_watch_get_counts(const struct gn_watch *w, struct gn_watch_counts *out)
+{
+    *out = w->counts;
+}

@@ -1,0 +1,47 @@
+/* SPDX-FileCopyrightText: 2026 the Gnomon authors */
+/* SPDX-License-Identifier: ISC */
+/*
+ * The bodies' markers from picture to picture: followed where they were, searched for where that
+ * fails or some are missing.
+ */
+#ifndef GN_CLIENT_TRACK_WATCH_H
+#define GN_CLIENT_TRACK_WATCH_H
+
+#include "client/track/bodies.h"
+#include "client/track/search.h"
+
+/** What a watch has counted, in pictures, and markers. */
+struct gn_watch_counts {
+    uint64_t n_followed;       // pictures that were not searched: see follow.h
+    uint64_t n_searched_whole; // in which more than the markers' surroundings was searched
+    uint64_t n_coarse_corners; // markers whose corners are OpenCV's
+};
+
+/** Thread-safety: unsafe. */
+struct gn_watch;
+
+/** Borrows camera and bodies until it is destroyed. Returns as gn_search_create(). */
+GN_MUST_USE int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodies,
+                                struct gn_watch **out_watch, struct gn_error *out_error);
+/** NULL-safe; nulls *watch. */
+void gn_watch_destroy(struct gn_watch **watch);
+
+/**
+ * Looks at the next picture of the camera's, taken at time_ns. While nothing is seen, small markers
+ * are looked for every 100 ms only. Returns 0, or a negative errno and a sentence.
+ */
+GN_MUST_USE int gn_watch_update(struct gn_watch *watch, const struct gn_grey *grey, int64_t time_ns,
+                                struct gn_error *out_error);
+
+/**
+ * The bodies' markers in the last picture, but those that are there twice: they tell nothing.
+ * Borrowed until the next update.
+ */
+const struct gn_marker_sighting *gn_watch_get_sightings(const struct gn_watch *watch, int *out_n);
+
+/** Ids that the last whole search saw and that are no body's, at most max; returns how many. */
+int gn_watch_get_strangers(const struct gn_watch *watch, int max, int *out_ids);
+
+void gn_watch_get_counts(const struct gn_watch *watch, struct gn_watch_counts *out);
+
+#endif
