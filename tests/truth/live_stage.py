@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the Gnomon authors
 # SPDX-License-Identifier: ISC
 """What the runs from cameras to composites share: the rig's room, the programs, the judge."""
+import fcntl
 import glob
 import json
 import os
@@ -74,12 +75,14 @@ def make_sequence(rig, work):
     """The rig's sequence of the table, with its truth; returns its folder."""
     os.makedirs(work, exist_ok=True)
     light = os.path.join(work, 'live.hdr')
-    write_light(light)
     sequence = os.path.join(work, 'live')
-    subprocess.run([rig, 'make', '--light', light, '--probe', 'fisheye', '--width', str(WIDTH),
-                    '--height', str(HEIGHT), '--frames-per-light', '1', '--paths', '8',
-                    '--direct-paths', '128', '--bounces', '0', sequence], check=True,
-                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with open(os.path.join(work, 'lock'), 'w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        write_light(light)
+        subprocess.run([rig, 'make', '--light', light, '--probe', 'fisheye', '--width', str(WIDTH),
+                        '--height', str(HEIGHT), '--frames-per-light', '1', '--paths', '8',
+                        '--direct-paths', '128', '--bounces', '0', sequence], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return os.path.abspath(sequence)
 
 
