@@ -59,10 +59,17 @@ static void stop(struct v4l2_source *s)
     s->head.fd = -1;
 }
 
-/** Where converted pictures go. */
+static bool is_lent(const struct v4l2_source *s)
+{
+    return s->layout.is_borrowed && gn_v4l2_stream_may_lend(&s->stream);
+}
+
+/** Where converted and copied pictures go. */
 static int make_room(struct v4l2_source *s, struct gn_error *out_error)
 {
-    size_t n = s->layout.is_borrowed ? 0 : s->layout.n_out_bytes;
+    size_t n = is_lent(s)              ? 0
+               : s->layout.is_borrowed ? gn_v4l2_stream_get_room(&s->stream)
+                                       : s->layout.n_out_bytes;
     if (n <= s->pixels_bytes)
         return 0;
     free(s->pixels);
@@ -85,14 +92,17 @@ static int start(struct v4l2_source *s, const char *path, struct gn_error *out_e
     if (!err)
         err = gn_v4l2_device_set_controls(&s->device, &s->options, out_error);
     if (!err)
-        err = make_room(s, out_error);
-    if (!err)
         err = gn_v4l2_stream_start(&s->stream, out_error);
+    if (!err)
+        err = make_room(s, out_error);
     if (err) {
         stop(s);
         return err;
     }
     strcpy(s->card, s->device.card);
+    s->options.width = s->layout.width; // when it is back it gives the same pictures
+    s->options.height = s->layout.height;
+    s->options.pixel_format = s->layout.pixels->name;
     s->head.fd = s->device.fd;
     s->has_picture = false;
     s->last_ns = now_ns(s);
@@ -138,17 +148,22 @@ static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
     return now;
 }
 
-/** The capture of a whole picture, converted where it must be. */
+/** The capture of a whole picture, converted or copied where it must be. */
 static void give(struct v4l2_source *s, const struct gn_v4l2_picture *p, struct gn_capture *out)
 {
     const uint8_t *data = p->data;
     size_t n_bytes = s->layout.format == GN_CAPTURE_JPEG ? p->n_bytes : s->layout.n_out_bytes;
     s->counts.n_read++;
     s->counts.read_bytes += n_bytes;
-    if (!s->layout.is_borrowed) {
-        gn_v4l2_convert(&s->layout, data, s->pixels);
+    if (!is_lent(s)) {
+        if (s->layout.is_borrowed)
+            memcpy(s->pixels, data, n_bytes);
+        else
+            gn_v4l2_convert(&s->layout, data, s->pixels);
         s->counts.copied_bytes += n_bytes;
         data = s->pixels;
+        // The driver may fill it again at once. Where it is gone, the next picture tells.
+        (void)!gn_v4l2_stream_release(&s->stream);
     }
     snprintf(s->name, sizeof(s->name), "frame%06" PRIu64, s->counts.n_read);
     *out = (struct gn_capture){

@@ -7,8 +7,10 @@
 
 /** Buffers asked of the driver: one being read, one newest, the others being filled. */
 #define N_BUFFERS 5
-/** Fewest with which the driver always has one to fill. */
-#define MIN_BUFFERS 3
+/** Fewest that can be streamed with. */
+#define MIN_BUFFERS 2
+/** Fewest with which the driver always has one to fill while one is lent and one is newest. */
+#define MIN_BUFFERS_TO_LEND 3
 /** Largest buffer that is mapped. */
 #define MAX_BUFFER_BYTES ((size_t)1 << 29)
 /** A gap larger than this in the driver's numbers is no count of pictures. */
@@ -90,6 +92,19 @@ void gn_v4l2_stream_stop(struct gn_v4l2_stream *stream)
                                       .layout = stream->layout,
                                       .jpeg = stream->jpeg,
                                       .counts = stream->counts};
+}
+
+bool gn_v4l2_stream_may_lend(const struct gn_v4l2_stream *stream)
+{
+    return stream->n_buffers >= MIN_BUFFERS_TO_LEND;
+}
+
+size_t gn_v4l2_stream_get_room(const struct gn_v4l2_stream *stream)
+{
+    size_t most = 0;
+    for (uint32_t i = 0; i < stream->n_buffers; i++)
+        most = stream->buffers[i].n_bytes > most ? stream->buffers[i].n_bytes : most;
+    return most;
 }
 
 int gn_v4l2_stream_release(struct gn_v4l2_stream *stream)

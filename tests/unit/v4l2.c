@@ -267,6 +267,28 @@ static void test_unplugged_and_plugged_in_again(void **state)
         replug(way);
 }
 
+/* What was left to the camera stays as it was at first, though it has forgotten. */
+static void test_what_comes_back_gives_the_same_pictures(void **state)
+{
+    (void)state;
+    static const uint32_t formats[] = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_Y16, 0};
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){0});
+    fake.is_gone = true;
+    expect_news(source, "unplugged");
+    fake.is_gone = false;
+    fake.pix.width = 320;
+    fake.pix.height = 240;
+    fake.formats = formats; // and it has a better one
+    expect_news(source, "is back");
+    gn_fake_fill(&fake, 0, 128);
+    struct gn_capture c = read_picture(source);
+    assert_true(c.width == 640 && c.height == 480 && c.format == GN_CAPTURE_RGB8);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 static void test_what_comes_back_is_not_the_camera(void **state)
 {
     (void)state;
@@ -344,13 +366,13 @@ static void bend_format(struct v4l2_pix_format *pix)
 static void test_drivers_that_lie_at_the_start(void **state)
 {
     (void)state;
-    static const uint32_t counts[] = {1, 2, 33, UINT32_MAX};
+    static const uint32_t counts[] = {0x10000, 1, 33, UINT32_MAX};
     static const uint32_t lengths[] = {1, 640 * 480 * 2 - 1, (1u << 29) + 1, UINT32_MAX};
     struct gn_fake fake;
     gn_fake_init(&fake);
     for (size_t i = 0; i < 4; i++) {
         fake.n_given = counts[i];
-        assert_int_equal(refuse(&fake, "buffers; 3 to 32 are needed"), -EPROTO);
+        assert_int_equal(refuse(&fake, "buffers; 2 to 32 are needed"), -EPROTO);
     }
     fake.n_given = 0;
     for (size_t i = 0; i < 4; i++) {
@@ -443,6 +465,30 @@ static void test_nothing_is_copied_that_need_not_be(void **state)
     gn_fake_fill(&fake, 2, 0x10); // 0x1010 has thirteen bits
     expect_news(source, "more bits than its format has");
     assert_int_equal(get_counts(source).n_incomplete, 1);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
+/* Where the driver has only two buffers none is kept from it: what else is lent is copied. */
+static void test_two_buffers_are_enough(void **state)
+{
+    (void)state;
+    static const uint32_t formats[] = {V4L2_PIX_FMT_Y12, 0};
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    fake.formats = formats;
+    fake.n_given = 2;
+    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){0});
+    gn_fake_fill(&fake, 0, 0x0d);
+    struct gn_capture c = read_picture(source);
+    assert_true(fake.is_queued[0] && fake.is_queued[1]);
+    gn_fake_fill(&fake, 1, 0x0e);
+    gn_fake_fill(&fake, 2, 0x0f);
+    assert_int_equal(c.data[0], 0x0d);
+    assert_int_equal(c.data[c.data_bytes - 1], 0x0d);
+    assert_int_equal(read_picture(source).data[0], 0x0f);
+    struct gn_source_counts n = get_counts(source);
+    assert_true(n.n_skipped == 1 && n.copied_bytes == n.read_bytes && n.n_read == 2);
     gn_source_close(&source);
     gn_fake_finish(&fake);
 }
@@ -580,12 +626,14 @@ int main(void)
         cmocka_unit_test(test_times_are_never_ahead),
         cmocka_unit_test(test_times_that_are_none),
         cmocka_unit_test(test_unplugged_and_plugged_in_again),
+        cmocka_unit_test(test_what_comes_back_gives_the_same_pictures),
         cmocka_unit_test(test_what_comes_back_is_not_the_camera),
         cmocka_unit_test(test_a_camera_that_stalls_is_opened_again),
         cmocka_unit_test(test_drivers_that_lie_at_the_start),
         cmocka_unit_test(test_drivers_that_lie_about_buffers),
         cmocka_unit_test(test_drivers_without_end),
         cmocka_unit_test(test_nothing_is_copied_that_need_not_be),
+        cmocka_unit_test(test_two_buffers_are_enough),
         cmocka_unit_test(test_mjpeg_passes_as_jpeg),
         cmocka_unit_test(test_exposure_is_held_and_put_back),
         cmocka_unit_test(test_exposure_by_counts_or_not_at_all),

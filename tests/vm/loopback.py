@@ -9,6 +9,7 @@ The camera is the kernel's V4L2 with the driver v4l2loopback, which shows what f
 usage: loopback.py GNOMON_RIG GNOMOND GNOMON FAKE_GIGE WORK_FOLDER FEED KERNEL
 """
 import json
+import math
 import os
 import signal
 import sys
@@ -25,42 +26,74 @@ FEED, KERNEL = map(os.path.abspath, sys.argv[6:8])
 VIDEO = '/dev/video0'
 DRIVER = 'v4l2loopback'
 N_COMPOSITES = 3
+FORMATS = ('YUYV', 'MJPG')
+SKY = {'projection': 'latlong', 'response': {'type': 'srgb'}}
 RATE = 4  # pictures a second: the machine's processor is emulated
 
 
 def write_script(stage, address):
-    """What runs in the machine, whose 10.0.2.2 is our loopback."""
+    """What runs in the machine, whose 10.0.2.2 is our loopback: for each format a camera that gives
+    it and a viewer, then a probe that takes the same camera for the sky."""
+    server = '10.0.2.2:' + address.rsplit(':', 1)[1]
+    picture = os.path.join(stage.sequence, stage.frame['picture'])
     with open(stage.camera, encoding='utf-8') as f:
         script = 'cat >camera.json <<END\n%s\nEND\n' % f.read()
-    view = [stage.gnomon, 'view', '--server', '10.0.2.2:' + address.rsplit(':', 1)[1], '--v4l2',
-            VIDEO, '--camera', 'camera.json', '--marker', MARKER, '--out', 'composites']
-    return script + (
-        '%s >feed.out 2>feed.err &\nfeed=$!\n'
-        'until grep -q ready feed.out || ! kill -0 $feed; do sleep 0.1; done 2>/dev/null\n'
-        '%s >view.out 2>view.err &\nview=$!\n'
-        "until grep -q '^frame %d:' view.out || ! kill -0 $view; do sleep 0.1; done 2>/dev/null\n"
-        'kill -TERM $view\nwait $view\necho $? >view.rc\n'
-        'kill $feed\n' % (
-            quote(FEED, VIDEO, RATE, 'YUYV', os.path.join(stage.sequence, stage.frame['picture'])),
-            quote(*view), N_COMPOSITES))
+    script += 'cat >setup.json <<END\n%s\nEND\n' % json.dumps(SKY)
+    for name in FORMATS:
+        view = [stage.gnomon, 'view', '--server', server, '--v4l2', VIDEO, '--camera',
+                'camera.json', '--marker', MARKER, '--out', name]
+        script += (
+            '%s >%s.feed 2>&1 &\nfeed=$!\n'
+            'until grep -q ready %s.feed || ! kill -0 $feed; do sleep 0.1; done 2>/dev/null\n'
+            '%s >%s.out 2>%s.err &\nview=$!\n'
+            "until grep -q '^frame %d:' %s.out || ! kill -0 $view; do sleep 0.1; done 2>/dev/null\n"
+            'kill -TERM $view\nwait $view\necho $? >%s.rc\n' % (
+                quote(FEED, VIDEO, RATE, name, picture), name, name, quote(*view), name, name,
+                N_COMPOSITES, name, name))
+        if name == FORMATS[-1]:
+            script += 'step probe %s\n' % quote(
+                stage.gnomon, 'probe', '--server', server, '--v4l2', VIDEO, '--setup', 'setup.json',
+                '--count', N_COMPOSITES)
+        script += 'kill $feed\nwait $feed\n'
+    return script
 
 
 def play(stage, machine):
-    """Returns the folder of composites."""
+    """Returns the folder of composites of the first format."""
     daemon, address = stage.start_daemon()
     stage.start_sky('sky')
     lamp = stage.start_probe(address, [], RATE)
     machine.run(write_script(stage, address))
-    status, out, err = machine.get('view')
-    assert status == 0, out + err + machine.get_bytes('feed.err').decode()
     assert lamp.end() == 0 and daemon.end(signal.SIGTERM) == 0
-    report = json.loads(machine.get_bytes('composites/view.json'))
-    print('# ' + describe(report))
-    assert report['complete'] and report['results'] >= N_COMPOSITES, report
-    capture = report['capture']
-    n_bytes = 3 * WIDTH * HEIGHT  # of the one conversion, from YUYV
-    assert capture['copied_bytes'] == capture['read_bytes'] == n_bytes * capture['read'], capture
-    return os.path.join(machine.path, 'out', 'composites')
+    for name in FORMATS:
+        status, out, err = machine.get(name)
+        assert status == 0, out + err + machine.get_bytes(name + '.feed').decode()
+        report = json.loads(machine.get_bytes(name + '/view.json'))
+        print('# %s: %s' % (name, describe(report)))
+        assert report['complete'] and report['results'] >= N_COMPOSITES, report
+        capture = report['capture']
+        # The driver has two buffers only, so that a JPEG is copied, too.
+        assert capture['copied_bytes'] == capture['read_bytes'] > 0, capture
+    assert capture['read_bytes'] < WIDTH * HEIGHT * capture['read'], capture
+    status, out, err = machine.get('probe')
+    assert status == 0 and '%d environment frames sent' % N_COMPOSITES in out, out + err
+    folders = [os.path.join(machine.path, 'out', name) for name in FORMATS]
+    check_poses(*map(read_place, folders))
+    return folders[0]
+
+
+def read_place(folder):
+    """Where the marker was in the last picture, m."""
+    with open(os.path.join(folder, 'poses.jsonl'), encoding='utf-8') as f:
+        (body,) = json.loads(f.read().splitlines()[-1])['bodies']
+    return body['camera_from_body'][3:12:4]
+
+
+def check_poses(a, b):
+    """Within half a millimetre, at half a metre: what a JPEG of a webcam's quality takes."""
+    apart_mm = 1e3 * math.dist(a, b)
+    print('# the same marker by YUYV and by MJPG: %.2f mm apart' % apart_mm)
+    assert apart_mm < 0.5, (a, b)
 
 
 def main():

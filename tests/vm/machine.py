@@ -13,7 +13,7 @@ import tempfile
 
 TOOLS = ('qemu-system-x86_64', 'busybox', 'v4l2-ctl')
 # Drivers of cameras, and what makes each have one, /dev/video0.
-DRIVERS = {'vivid': 'n_devs=1 node_types=0x1', 'v4l2loopback': 'video_nr=0 exclusive_caps=1 max_buffers=4'}
+DRIVERS = {'vivid': 'n_devs=1 node_types=0x1', 'v4l2loopback': 'video_nr=0 exclusive_caps=1'}
 
 INIT = r"""#!/bin/busybox sh
 /bin/busybox --install -s /bin
