@@ -8,109 +8,39 @@ import json
 import os
 import random
 import re
-import shutil
 import signal
-import socket
 import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import Daemon, run_tests  # noqa: E402
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
+from run import GNOMON, Run, server  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
 WIDTH, HEIGHT = 64, 48
 # 2 m above the floor, looking down; the floor's 2 m fill the middle of the picture's 4 m.
 CAMERA = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH / 2, 'fy': WIDTH / 2, 'cx': WIDTH / 2,
           'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],
           'world_from_camera': [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 2, 0, 0, 0, 1]}
-SANITIZERS = ('AddressSanitizer', 'LeakSanitizer', 'ThreadSanitizer', 'runtime error')
 
 
 def noise(seed, n=3 * WIDTH * HEIGHT):
     return random.Random(seed).getrandbits(8 * n).to_bytes(n, 'little')
 
 
-class Bench:
+class Bench(Folder):
     """A folder with a camera, n camera frames and a light."""
 
     def __init__(self, n=6):
-        self.path = tempfile.mkdtemp(prefix='gnomon-client-test.')
+        super().__init__()
         self.write('camera.json', json.dumps(CAMERA).encode())
         os.mkdir(self.at('shots'))
         self.shots = [noise(i) for i in range(n)]
         for i, shot in enumerate(self.shots):
             self.write('shots/f%03d.png' % i, png_bytes(WIDTH, HEIGHT, shot))
         self.write('light.exr', exr_bytes(32, 16, (1, 1, 1)))
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
-    def write(self, name, data):
-        with open(self.at(name), 'wb') as out:
-            out.write(data)
-        return self.at(name)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
-
-
-class Run:
-    """One run of gnomon."""
-
-    def __init__(self, *arguments):
-        self.out, self.err = tempfile.TemporaryFile('w+'), tempfile.TemporaryFile('w+')
-        self.process = subprocess.Popen([GNOMON, *arguments], stdout=self.out, stderr=self.err)
-
-    @staticmethod
-    def read(stream):
-        """All of it so far. The process writes where the shared position is: it must not move."""
-        return os.pread(stream.fileno(), 1 << 22, 0).decode('utf-8', 'replace')
-
-    def wait_for(self, text, timeout=60):
-        """Until the standard output has the text."""
-        deadline = time.monotonic() + timeout
-        while text not in self.read(self.out):
-            assert self.process.poll() is None, 'ended: ' + self.read(self.err)
-            assert time.monotonic() < deadline, 'never said %r' % text
-            time.sleep(0.02)
-
-    def end(self, timeout=120):
-        """Exit status, standard output and standard error."""
-        try:
-            status = self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            raise AssertionError('did not end: %s%s' % (self.read(self.out), self.read(self.err)))
-        out, err = self.read(self.out), self.read(self.err)
-        self.out.close()
-        self.err.close()
-        assert not any(word in err for word in SANITIZERS), err
-        return status, out, err
-
-    def succeed(self):
-        status, out, err = self.end()
-        assert status == 0 and err == '', 'status %d: %s%s' % (status, out, err)
-        return out
-
-    def fail(self, status, *words):
-        """It must end with the status and one line on standard error that has the words."""
-        got, out, err = self.end()
-        assert got == status, 'status %d: %s%s' % (got, out, err)
-        assert err.count('\n') == 1 and err.endswith('\n') and err.startswith('gnomon'), err
-        for word in words:
-            assert word in err, '%r is not in %r' % (word, err)
-        return err
-
-
-def server(daemon):
-    return '--server=%s:%d' % daemon.address
 
 
 def probe(daemon, bench, *more, files='light.exr'):

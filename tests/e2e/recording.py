@@ -7,12 +7,9 @@ usage: recording.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 import json
 import os
 import random
-import resource
 import signal
 import struct
-import subprocess
 import sys
-import tempfile
 import time
 import zlib
 
@@ -20,8 +17,8 @@ sys.path.insert(0, sys.argv[2])
 from folder import Folder  # noqa: E402
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
+from run import Run, server  # noqa: E402
 
-GNOMON = sys.argv[3]
 WIDTH, HEIGHT, FRAMES = 64, 48, 6
 CAMERA_JSON = {'width': WIDTH, 'height': HEIGHT, 'fx': WIDTH / 2, 'fy': WIDTH / 2, 'cx': WIDTH / 2,
                'cy': HEIGHT / 2, 'distortion': [0, 0, 0, 0, 0],
@@ -30,7 +27,6 @@ SCENE = '{"objects": [{"mesh": "floor.obj", "role": "real"},' \
     ' {"mesh": "cube.obj", "role": "virtual", "name": "cube", "movable": true}]}'
 # Nothing of a room that depends on when something happens: what a replay to the bit needs.
 STEADY = 'light-smoothing-ms = 0\nenvironment-noise = 0\nrefine = false\n'
-SANITIZERS = ('AddressSanitizer', 'LeakSanitizer', 'ThreadSanitizer', 'runtime error')
 
 
 def open_room():
@@ -52,64 +48,6 @@ class Given(Folder):
                                                           0, 0, 0, 1]} for i in range(4)]
         self.write('poses.jsonl', '\n'.join(map(json.dumps, poses)).encode())
         self.recording = self.at('session.gnr')
-
-
-class Run:
-    """One run of gnomon."""
-
-    def __init__(self, *arguments, limit=None):
-        self.out, self.err = tempfile.TemporaryFile('w+'), tempfile.TemporaryFile('w+')
-
-        def bound():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-        self.process = subprocess.Popen([GNOMON, *arguments], stdout=self.out, stderr=self.err,
-                                        preexec_fn=bound if limit else None)
-
-    @staticmethod
-    def read(stream):
-        return os.pread(stream.fileno(), 1 << 22, 0).decode('utf-8', 'replace')
-
-    def wait_for(self, text, timeout=60):
-        deadline = time.monotonic() + timeout
-        while text not in self.read(self.out):
-            assert self.process.poll() is None, 'ended: ' + self.read(self.err)
-            assert time.monotonic() < deadline, 'never said %r' % text
-            time.sleep(0.02)
-
-    def end(self, timeout=120):
-        try:
-            status = self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            raise AssertionError('did not end: %s%s' % (self.read(self.out), self.read(self.err)))
-        out, err = self.read(self.out), self.read(self.err)
-        self.out.close()
-        self.err.close()
-        assert not any(word in err for word in SANITIZERS), err
-        return status, out, err
-
-    def succeed(self, *words):
-        status, out, err = self.end()
-        # A machine may be busy for as long as the start was put off; that is said, and is no fault.
-        err = ''.join(l for l in err.splitlines(True) if 'the time to start was' not in l)
-        assert status == 0 and err == '', 'status %d: %s%s' % (status, out, err)
-        for word in words:
-            assert word in out, '%r is not in %r' % (word, out)
-        return out
-
-    def fail(self, status, *words):
-        got, out, err = self.end()
-        assert got == status, 'status %d: %s%s' % (got, out, err)
-        assert err.startswith('gnomon') and err.count('\n') == 1, err
-        for word in words:
-            assert word in err, '%r is not in %r' % (word, err)
-        return out
-
-
-def server(daemon):
-    return '--server=%s:%d' % daemon.address
 
 
 def begin(daemon, folder, *more, rate='8', recording=None):
@@ -288,12 +226,12 @@ def test_other_light():
     with Given() as folder:
         record(folder)
         with Daemon(STEADY + 'light-method = median-cut\nlights = 2\n') as daemon:
-            out = replay(daemon, folder, '--expect-equal', '--as-fast-as-possible').fail(
+            out, _ = replay(daemon, folder, '--expect-equal', '--as-fast-as-possible').fail(
                 1, '%d of %d composites are not as recorded' % (FRAMES, FRAMES))
             assert 'frame 3: not the recorded composite: ' in out, out
         with open_room() as daemon:  # no light at all
-            out = replay(daemon, folder, '--streams', 'viewer', '--rate-factor', '50',
-                         '--open-loop', '--expect-equal').fail(1, 'are not as recorded')
+            out, _ = replay(daemon, folder, '--streams', 'viewer', '--rate-factor', '50',
+                          '--open-loop', '--expect-equal').fail(1, 'are not as recorded')
             assert 'dropped, though recorded with a result: ' in out, out
 
 
