@@ -193,10 +193,13 @@ static void print_points(const struct gn_chart_shot *shots, int n,
             used += is_sure;
             sum += is_sure ? p->error * p->error : 0;
         }
-        printf("%s: exposure %.4g, %d of %d codes clipped; error %.2f %% RMS over %d sure to %.0f "
-               "%%\n",
-               shots[k].name, r->time[k], clipped, n_values,
-               100 * sqrt(sum / (used > 0 ? used : 1)), used, 100 * GN_CHART_SURE);
+        printf("%s: exposure %.4g, %d of %d codes clipped; ", shots[k].name, r->time[k], clipped,
+               n_values);
+        if (used > 0)
+            printf("error %.2f %% RMS over %d sure to %.0f %%\n", 100 * sqrt(sum / used), used,
+                   100 * GN_CHART_SURE);
+        else
+            printf("no code fine enough to be sure to %.0f %%\n", 100 * GN_CHART_SURE);
     }
     for (int i = 0; i < r->n_points; i++) {
         const struct gn_chart_point *p = &r->points[i];

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "client/calibrate_live.h"
+#include "client/calibrate_mean.h"
 #include "client/calibrate_series.h"
 #include "client/cmd.h"
 #include "common/clock.h"
@@ -27,8 +28,6 @@
 #define AUTO_MOST_US 1e6
 #define AUTO_SPAN 0.03
 #define AUTO_CLIPPED 0.5
-/* Codes from this share of full scale on are clipped. */
-#define BRIGHT_RAIL 0.99
 /* All pictures of a series, bytes. */
 #define MAX_BYTES ((size_t)2 << 30)
 
@@ -50,22 +49,6 @@ struct work {
     int n_frames;
     int full_scale; // that was asked for; 0: the format's
     bool is_8_bit;
-};
-
-/* The mean of some pictures, as it grows. */
-struct mean {
-    struct gn_image_file last; // picture that came last
-    int full_scale, bits;
-    size_t n_values;
-    uint32_t *sums;  // [n_values]
-    double squares;  // of the differences of each picture and the one before
-    double level[2]; // least and largest mean code of a picture
-};
-
-/* What an exposure's pictures look like. */
-struct figures {
-    double span;    // of codes, 1st to 99th percentile, share of full scale
-    double clipped; // share of values
 };
 
 static const struct {
@@ -127,99 +110,6 @@ static const char *get_unit(const struct work *w)
     return w->unit == GN_EXPOSURE_US ? "us" : "counts";
 }
 
-static double get_code(const struct gn_image_file *picture, size_t i)
-{
-    return picture->kind == GN_IMAGE_CODES8 ? picture->codes8.data[i] : picture->codes16.data[i];
-}
-
-/* Adds a picture, which it takes over. */
-static int add_picture(struct mean *m, int k, struct gn_image_file *picture, struct gn_error *error)
-{
-    const struct gn_image_file *p = picture, *last = &m->last;
-    bool is_8 = p->kind == GN_IMAGE_CODES8;
-    size_t n =
-        is_8 ? (size_t)p->codes8.width * (size_t)p->codes8.height * (size_t)p->codes8.channels
-             : (size_t)p->codes16.width * (size_t)p->codes16.height * (size_t)p->codes16.channels;
-    if (k == 0) {
-        m->n_values = n;
-        m->sums = calloc(n, sizeof(*m->sums));
-        if (!m->sums)
-            return gn_error_set(error, -ENOMEM, "out of memory");
-    } else if (n != m->n_values || p->kind != last->kind) {
-        return gn_error_set(error, -EINVAL, "the camera's pictures are not of one size");
-    }
-    double level = 0, squares = 0;
-    for (size_t i = 0; i < n; i++) {
-        double code = get_code(p, i), step = k > 0 ? code - get_code(last, i) : 0;
-        m->sums[i] += (uint32_t)code;
-        level += code;
-        squares += step * step;
-    }
-    m->squares += squares;
-    m->level[0] = k == 0 ? level / (double)n : fmin(m->level[0], level / (double)n);
-    m->level[1] = k == 0 ? level / (double)n : fmax(m->level[1], level / (double)n);
-    gn_image_file_finish(&m->last);
-    m->last = *picture;
-    memset(picture, 0, sizeof(*picture));
-    return 0;
-}
-
-static void finish_mean(struct mean *m)
-{
-    gn_image_file_finish(&m->last);
-    free(m->sums);
-    memset(m, 0, sizeof(*m));
-}
-
-/* The mean in the place of the last picture: rounded to its own codes where they have 8 bits and
- * such are wanted, else in 16 bits and as much finer as these are. */
-static int close_mean(struct mean *m, int n, bool is_8_bit, struct gn_image_file *out,
-                      struct gn_error *error)
-{
-    const uint32_t count = (uint32_t)n;
-    struct gn_image_file *last = &m->last;
-    bool is_8 = last->kind == GN_IMAGE_CODES8;
-    uint32_t finer = is_8_bit && is_8 ? 1 : 65535 / (uint32_t)m->full_scale;
-    memset(out, 0, sizeof(*out));
-    if (is_8 && !is_8_bit) {
-        out->kind = GN_IMAGE_CODES16;
-        if (gn_image16_init(&out->codes16, last->codes8.width, last->codes8.height,
-                            last->codes8.channels) < 0)
-            return gn_error_set(error, -ENOMEM, "out of memory");
-    } else {
-        *out = *last;
-        memset(last, 0, sizeof(*last));
-    }
-    for (size_t i = 0; i < m->n_values; i++) {
-        uint32_t mean = (uint32_t)(((uint64_t)m->sums[i] * finer + count / 2) / count);
-        if (out->kind == GN_IMAGE_CODES8)
-            out->codes8.data[i] = (uint8_t)mean;
-        else
-            out->codes16.data[i] = (uint16_t)(mean < 65535 ? mean : 65535);
-    }
-    m->full_scale *= (int)finer;
-    return 0;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static struct figures find_figures(const struct mean *m, int n)
-{
-    double sample[4096], clipped = 0;
-    size_t count = 0, stride = 1 + m->n_values / GN_ARRAY_LEN(sample);
-    for (size_t i = 0; i < m->n_values; i += stride) {
-        sample[count++] = m->sums[i] / ((double)n * m->full_scale);
-        clipped += sample[count - 1] >= BRIGHT_RAIL;
-    }
-    qsort(sample, count, sizeof(*sample), compare_doubles);
-    return (struct figures){.span = sample[count - 1 - count / 100] - sample[count / 100],
-                            .clipped = clipped / (double)count};
-}
-
 /* Waits until pictures have the exposure that was set. Returns 0 or a negative errno. */
 static int settle(const struct work *w, double value, struct gn_error *out_error)
 {
@@ -243,26 +133,6 @@ static int settle(const struct work *w, double value, struct gn_error *out_error
     return 0;
 }
 
-static int take_mean(const struct work *w, struct mean *m, struct gn_error *out_error)
-{
-    for (int k = 0; k < w->n_frames; k++) {
-        struct gn_capture capture;
-        struct gn_image_file picture = {.kind = GN_IMAGE_LINEAR};
-        int got = gn_calibrate_wait(w->program, w->source, &capture, out_error);
-        if (got <= 0)
-            return got < 0 ? got : -EINTR;
-        int err = gn_calibrate_decode(&capture, &picture, &m->full_scale, out_error);
-        m->full_scale = w->full_scale ? w->full_scale : m->full_scale;
-        m->bits = capture.bits > 0 ? capture.bits : (int)lround(log2(m->full_scale + 1.0));
-        if (!err)
-            err = add_picture(m, k, &picture, out_error);
-        gn_image_file_finish(&picture);
-        if (err)
-            return err;
-    }
-    return 0;
-}
-
 static int name_picture(struct work *w, double value, struct gn_error *out_error)
 {
     char name[4096];
@@ -276,51 +146,56 @@ static int name_picture(struct work *w, double value, struct gn_error *out_error
     return s->names[s->n] ? 0 : gn_error_set(out_error, -ENOMEM, "out of memory");
 }
 
-/* One exposure. least_span: a picture whose codes span less is not kept. */
-static int shoot(struct work *w, double asked, double least_span, struct figures *out_figures,
-                 struct gn_error *out_error)
+/* Adds a mean to the series, and to the folder. */
+static int keep(struct work *w, const struct gn_calibrate_mean *mean, double value,
+                struct gn_error *out_error)
 {
     struct gn_calibrate_series *s = w->series;
-    struct mean m = {.full_scale = 255};
-    double value = 0;
+    size_t n_bytes = 2 * (size_t)mean->width * (size_t)mean->height * (size_t)mean->channels;
+    if (n_bytes * (size_t)(s->n + 1) > MAX_BYTES)
+        return gn_error_set(out_error, -ENOMEM,
+                            "more than %zu MiB of pictures: take fewer exposures, or a smaller "
+                            "--frame-size",
+                            MAX_BYTES >> 20);
+    if (gn_calibrate_mean_get_codes(mean, w->is_8_bit, &s->taken[s->n], &s->format.full_scale16) <
+        0)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    s->bits = mean->bits;
+    int err = name_picture(w, value, out_error);
+    if (!err && w->folder)
+        err = gn_calibrate_write(s->names[s->n], &s->taken[s->n], out_error);
+    if (!err)
+        s->times[s->n++] = value;
+    return err;
+}
+
+/* One exposure. least_span: a picture whose codes span less is not kept. */
+static int shoot(struct work *w, double asked, double least_span, double *out_clipped,
+                 struct gn_error *out_error)
+{
+    struct gn_calibrate_mean mean = {0};
+    double value = 0, span = 0;
     int err = gn_source_set_exposure(w->source, asked, &value, out_error);
     if (!err)
         err = settle(w, value, out_error);
     if (!err)
-        err = take_mean(w, &m, out_error);
-    if (!err && 2 * m.n_values * (size_t)(s->n + 1) > MAX_BYTES)
-        err = gn_error_set(out_error, -ENOMEM,
-                           "more than %zu MiB of pictures: take fewer exposures, or a smaller "
-                           "--frame-size",
-                           MAX_BYTES >> 20);
-    if (err) {
-        finish_mean(&m);
+        err = gn_calibrate_mean_take(w->program, w->source, w->n_frames, w->full_scale, &mean,
+                                     out_error);
+    if (err)
         return err;
-    }
-    *out_figures = find_figures(&m, w->n_frames);
-    double noise = sqrt(m.squares / (2 * fmax(w->n_frames - 1, 1) * (double)m.n_values));
-    bool is_kept = out_figures->span >= least_span;
+    gn_calibrate_mean_describe(&mean, &span, out_clipped);
     printf("%g %s", value, get_unit(w));
     if (fabs(value - asked) > 1e-6 * asked)
         printf(" (asked %g)", asked);
     if (w->n_frames > 1)
-        printf(": mean of %d, noise %.2f codes of %d, level steady to %.2f", w->n_frames, noise,
-               m.full_scale, m.level[1] - m.level[0]);
-    printf("; %.1f %% clipped%s\n", 100 * out_figures->clipped,
-           is_kept ? "" : "; too dark, left out");
+        printf(": mean of %d, noise %.2f codes of %d, level steady to %.2f", w->n_frames,
+               mean.noise, mean.full_scale, mean.unsteadiness);
+    printf("; %.1f %% clipped%s\n", 100 * *out_clipped,
+           span < least_span ? "; too dark, left out" : "");
     fflush(stdout);
-    if (is_kept)
-        err = close_mean(&m, w->n_frames, w->is_8_bit, &s->taken[s->n], out_error);
-    if (is_kept && !err)
-        err = name_picture(w, value, out_error);
-    if (is_kept && !err && w->folder)
-        err = gn_calibrate_write(s->names[s->n], &s->taken[s->n], out_error);
-    if (is_kept && !err) {
-        s->times[s->n++] = value;
-        s->format.full_scale16 = m.full_scale;
-        s->bits = m.bits;
-    }
-    finish_mean(&m);
+    if (span >= least_span)
+        err = keep(w, &mean, value, out_error);
+    gn_calibrate_mean_finish(&mean);
     return err;
 }
 
@@ -328,21 +203,21 @@ static int shoot(struct work *w, double asked, double least_span, struct figures
 static int shoot_doubling(struct work *w, const struct gn_exposure *range,
                           struct gn_error *out_error)
 {
-    struct figures figures = {0};
+    double clipped = 0;
     double most = w->unit == GN_EXPOSURE_US ? fmin(range->most, AUTO_MOST_US) : range->most;
-    int err = shoot(w, fmin(fmax(range->now, range->least), range->most), 0, &figures, out_error);
-    figures.clipped = 0;
+    int err = shoot(w, fmin(fmax(range->now, range->least), range->most), 0, &clipped, out_error);
+    clipped = 0;
     for (double value = fmax(range->least, 1);
-         !err && value <= most && figures.clipped < AUTO_CLIPPED && w->series->n < GN_SERIES_MAX;
+         !err && value <= most && clipped < AUTO_CLIPPED && w->series->n < GN_SERIES_MAX;
          value *= 2)
-        err = shoot(w, value, AUTO_SPAN, &figures, out_error);
+        err = shoot(w, value, AUTO_SPAN, &clipped, out_error);
     return err;
 }
 
 static int shoot_all(struct work *w, const struct plan *plan, const struct gn_exposure *range,
                      struct gn_error *out_error)
 {
-    struct figures figures;
+    double clipped;
     int err = 0;
     if (plan->is_auto)
         return shoot_doubling(w, range, out_error);
@@ -358,7 +233,7 @@ static int shoot_all(struct work *w, const struct plan *plan, const struct gn_ex
     for (int i = 0; !err && i < plan->n; i++) {
         printf("exposure %d of %d: ", i + 1, plan->n);
         fflush(stdout);
-        err = shoot(w, plan->values[i], 0, &figures, out_error);
+        err = shoot(w, plan->values[i], 0, &clipped, out_error);
     }
     return err;
 }

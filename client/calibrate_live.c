@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "client/calibrate_input.h"
+#include "client/calibrate_mean.h"
 #include "client/capture/file.h"
 #include "client/capture/video.h"
 #include "common/jpeg.h"
@@ -125,59 +125,18 @@ int gn_calibrate_take(const struct gn_program *program, struct gn_source *source
     return err ? err : 1;
 }
 
-/* The next picture as floats. As gn_calibrate_take. */
-static int take_floats(const struct gn_program *program, struct gn_source *source, int full_scale16,
-                       struct gn_image *out, double *out_code_step, struct gn_error *out_error)
-{
-    struct gn_image_file picture;
-    struct gn_calibrate_format format = {0};
-    int ret = gn_calibrate_take(program, source, &picture, &format.full_scale16, out_error);
-    if (ret <= 0)
-        return ret;
-    if (full_scale16 > 0)
-        format.full_scale16 = full_scale16;
-    int err = gn_calibrate_convert("the picture", &picture, &format, out, out_code_step, out_error);
-    gn_image_file_finish(&picture);
-    return err ? err : 1;
-}
-
 int gn_calibrate_take_mean(const struct gn_program *program, struct gn_source *source, int n,
                            int full_scale16, struct gn_image *out_image, double *out_code_step,
                            struct gn_error *out_error)
 {
-    struct gn_image mean = {0}; // the first picture's memory
-    double *sums = NULL;
-    size_t n_values = 0;
-    int err = 0;
-    for (int k = 0; !err && k < n; k++) {
-        struct gn_image next = {0};
-        int got = take_floats(program, source, full_scale16, &next, out_code_step, out_error);
-        if (got == 1 && k == 0) {
-            n_values = (size_t)next.width * (size_t)next.height * (size_t)next.channels;
-            sums = calloc(n_values, sizeof(*sums));
-            mean = next;
-        }
-        if (got < 0)
-            err = got;
-        else if (got == 0)
-            err = gn_error_set(out_error, -EINTR, "%d of %d pictures came", k, n);
-        else if (!sums)
-            err = gn_error_set(out_error, -ENOMEM, "out of memory");
-        else if (next.width != mean.width || next.height != mean.height ||
-                 next.channels != mean.channels)
-            err = gn_error_set(out_error, -EINVAL, "the pictures are not of one size");
-        for (size_t i = 0; !err && i < n_values; i++)
-            sums[i] += (double)next.data[i];
-        if (next.data != mean.data)
-            gn_image_finish(&next);
-    }
-    for (size_t i = 0; !err && i < n_values; i++)
-        mean.data[i] = (float)(sums[i] / n);
-    free(sums);
+    struct gn_calibrate_mean mean;
+    int err = gn_calibrate_mean_take(program, source, n, full_scale16, &mean, out_error);
     if (err)
-        gn_image_finish(&mean);
-    else
-        *out_image = mean;
+        return err;
+    *out_code_step = 1.0 / mean.full_scale;
+    if (gn_calibrate_mean_get_floats(&mean, out_image) < 0)
+        err = gn_error_set(out_error, -ENOMEM, "out of memory");
+    gn_calibrate_mean_finish(&mean);
     return err;
 }
 

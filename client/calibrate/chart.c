@@ -215,22 +215,7 @@ static double correlate_ranks(const double a[24], const double b[24])
     return aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
 }
 
-/* Whether they darken from white to black, but for 2 % of what the patches span. */
-static bool do_greys_fall(const double code[24])
-{
-    double least = code[0], most = code[0];
-    for (int j = 1; j < 24; j++) {
-        least = fmin(least, code[j]);
-        most = fmax(most, code[j]);
-    }
-    for (int j = GN_CHART_WHITE + 1; j < 24; j++)
-        if (code[j] > code[j - 1] + 0.02 * (most - least))
-            return false;
-    return true;
-}
-
-double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place,
-                             bool *out_greys_fall)
+double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place)
 {
     struct gn_chart_patch measured[24];
     double expected[4][24], best = -1;
@@ -247,12 +232,7 @@ double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart
         double code[24]; // ranks: any response that rises keeps them
         for (int j = 0; j < 24; j++)
             code[j] = measured[j].code[i / 4];
-        double likeness = correlate_ranks(code, expected[i % 4]);
-        if (likeness > best) {
-            best = likeness;
-            if (out_greys_fall)
-                *out_greys_fall = do_greys_fall(code);
-        }
+        best = fmax(best, correlate_ranks(code, expected[i % 4]));
     }
     return best;
 }
@@ -266,7 +246,7 @@ double gn_chart_orient(const struct gn_image *image, struct gn_chart_place *plac
         struct gn_chart_place tried;
         for (int i = 0; i < 4; i++)
             memcpy(tried.corners + 2 * i, place->corners + 2 * ways[w][i], 2 * sizeof(double));
-        double likeness = gn_chart_get_likeness(image, &tried, NULL);
+        double likeness = gn_chart_get_likeness(image, &tried);
         if (likeness > best) {
             best = likeness;
             best_place = tried;

@@ -60,11 +60,9 @@ void gn_chart_get_outline(const struct gn_chart_place *place, int patch, double 
  * How like the chart what lies at a place is: the rank correlation (Spearman's) of the codes of a
  * channel with the patches' luminance or reflectance in red, green or blue, where it is best: light
  * of one band does as well as white, and a channel that is clipped does no harm. 1 at best, below
- * 0.8 it is no such chart; -1 where it cannot be measured. out_greys_fall (may be NULL): whether
- * the greys darken from white to black there, within 2 % of the patches' span.
+ * 0.8 it is no such chart; -1 where it cannot be measured.
  */
-double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place,
-                             bool *out_greys_fall);
+double gn_chart_get_likeness(const struct gn_image *image, const struct gn_chart_place *place);
 
 /**
  * Which of the chart's four ways to lie (turned by 180 degrees, mirrored) is most like it; *place

@@ -349,10 +349,7 @@ static int choose(const struct gn_image *image, const struct grid *g, double fac
                 if (count_window(g, u, v, columns, rows) < seen - 2)
                     continue;
                 set_place(g, factor, u, v, columns, rows, i, &tried.at);
-                bool greys_fall = false;
-                tried.likeness = gn_chart_get_likeness(image, &tried.at, &greys_fall);
-                if (!greys_fall)
-                    continue;
+                tried.likeness = gn_chart_get_likeness(image, &tried.at);
                 if (tried.likeness > best.likeness) {
                     second = best.likeness;
                     best = tried;
