@@ -40,16 +40,19 @@ static void place(const struct gn_rig_view *view, const struct gn_rig_sheet *she
     }
 }
 
-static struct met look(const struct placed *sheets, int n_sheets, const double ray[static 2])
+static struct met look(const struct placed *sheets, int n_sheets, double least_z,
+                       const double ray[static 3])
 {
     struct met met = {gn_rig_backdrop, 0};
+    if (ray[2] < least_z) // outside a fisheye's circle
+        return (struct met){0, -1};
     double nearest = INFINITY;
     for (int s = 0; s < n_sheets; s++) {
         const struct gn_rig_sheet *sheet = sheets[s].sheet;
         double d[3];
         for (int k = 0; k < 3; k++)
             d[k] = sheets[s].turn[k][0] * ray[0] + sheets[s].turn[k][1] * ray[1] +
-                   sheets[s].turn[k][2];
+                   sheets[s].turn[k][2] * ray[2];
         const double *eye = sheets[s].eye;
         double t = -eye[2] / d[2];
         double x = eye[0] + t * d[0], y = eye[1] + t * d[1];
@@ -71,23 +74,62 @@ static struct met look(const struct placed *sheets, int n_sheets, const double r
     return met;
 }
 
+static int take_memory(struct gn_rig_marker_camera *camera, const struct gn_rig_view *view)
+{
+    size_t n = (size_t)(2 * view->width + 1) * (size_t)(2 * view->height + 1);
+    *camera = (struct gn_rig_marker_camera){.view = *view};
+    camera->rays = malloc(n * 3 * sizeof(*camera->rays));
+    return camera->rays ? 0 : -ENOMEM;
+}
+
 int gn_rig_marker_camera_init(struct gn_rig_marker_camera *camera, const struct gn_rig_view *view)
 {
     struct gn_rig_view still = *view;
-    size_t n = (size_t)(2 * view->width + 1) * (size_t)(2 * view->height + 1);
-    *camera = (struct gn_rig_marker_camera){.view = *view};
-    camera->rays = malloc(n * 2 * sizeof(*camera->rays));
-    if (!camera->rays)
+    if (take_memory(camera, view) < 0)
         return -ENOMEM;
     for (int i = 0; i < 16; i++)
         still.world_from_camera[i] = i % 5 == 0;
     double *ray = camera->rays;
     for (int y = 0; y <= 2 * view->height; y++) {
-        for (int x = 0; x <= 2 * view->width; x++, ray += 2) {
+        for (int x = 0; x <= 2 * view->width; x++, ray += 3) {
             double dir[3];
             gn_rig_view_get_ray(&still, 0.5 * x, 0.5 * y, dir);
             ray[0] = dir[0] / dir[2];
             ray[1] = dir[1] / dir[2];
+            ray[2] = 1;
+        }
+    }
+    return 0;
+}
+
+/** The angle from the axis at r = focal rho, by Newton's method; a little beyond theta_max at most.
+ */
+static double get_theta(const struct gn_rig_fisheye *lens, double rho)
+{
+    double t = rho;
+    for (int i = 0; i < 8; i++) {
+        double t2 = t * t, value = t * (1 + t2 * (lens->k[0] + t2 * lens->k[1])) - rho;
+        t -= value / (1 + t2 * (3 * lens->k[0] + t2 * 5 * lens->k[1]));
+    }
+    return fmin(t, lens->theta_max + 0.05);
+}
+
+int gn_rig_marker_fisheye_init(struct gn_rig_marker_camera *camera,
+                               const struct gn_rig_fisheye *lens)
+{
+    const struct gn_rig_view view = {
+        .width = lens->width, .height = lens->height, .blur_px = lens->blur_px};
+    if (take_memory(camera, &view) < 0)
+        return -ENOMEM;
+    double *ray = camera->rays;
+    camera->least_z = cos(lens->theta_max);
+    for (int y = 0; y <= 2 * lens->height; y++) {
+        for (int x = 0; x <= 2 * lens->width; x++, ray += 3) {
+            double dx = 0.5 * x - lens->center[0], dy = 0.5 * y - lens->center[1];
+            double r = hypot(dx, dy), theta = get_theta(lens, r / lens->focal);
+            ray[0] = r > 0 ? sin(theta) * dx / r : 0;
+            ray[1] = r > 0 ? sin(theta) * dy / r : 0;
+            ray[2] = cos(theta);
         }
     }
     return 0;
@@ -100,19 +142,20 @@ void gn_rig_marker_camera_finish(struct gn_rig_marker_camera *camera)
 }
 
 /** The mean over a pixel; ray: at its top left corner. Between half pixels the lens is linear. */
-static double get_mean(const struct placed *sheets, int n_sheets, const double *ray, long stride)
+static double get_mean(const struct placed *sheets, int n_sheets, double least_z, const double *ray,
+                       long stride)
 {
     double sum = 0;
     for (int i = 0; i < POINTS * POINTS; i++) {
         double u = 2 * (i % POINTS + 0.5) / POINTS, v = 2 * (i / POINTS + 0.5) / POINTS;
-        const double *r = ray + 2 * ((v >= 1) * stride + (u >= 1));
-        const double *s = r + 2 * stride;
-        double p[2];
+        const double *r = ray + 3 * ((v >= 1) * stride + (u >= 1));
+        const double *s = r + 3 * stride;
+        double p[3];
         u -= u >= 1;
         v -= v >= 1;
-        for (int k = 0; k < 2; k++)
-            p[k] = (1 - v) * ((1 - u) * r[k] + u * r[2 + k]) + v * ((1 - u) * s[k] + u * s[2 + k]);
-        sum += look(sheets, n_sheets, p).value;
+        for (int k = 0; k < 3; k++)
+            p[k] = (1 - v) * ((1 - u) * r[k] + u * r[3 + k]) + v * ((1 - u) * s[k] + u * s[3 + k]);
+        sum += look(sheets, n_sheets, least_z, p).value;
     }
     return sum / (POINTS * POINTS);
 }
@@ -143,14 +186,15 @@ static void expose(const struct gn_rig_marker_camera *camera, const struct place
 {
     long w = camera->view.width, h = camera->view.height, stride = 2 * w + 1;
     for (long i = 0; i < stride * (2 * h + 1); i++)
-        met[i] = look(sheets, n_sheets, camera->rays + 2 * i);
+        met[i] = look(sheets, n_sheets, camera->least_z, camera->rays + 3 * i);
     for (long i = 0; i < w * h; i++) {
         long at = 2 * (i / w) * stride + 2 * (i % w);
         bool is_even = true;
         for (int k = 0; k < 9; k++)
             is_even = is_even && met[at + k / 3 * stride + k % 3].what == met[at].what;
         mean[i] = (float)(is_even ? met[at].value
-                                  : get_mean(sheets, n_sheets, camera->rays + 2 * at, stride));
+                                  : get_mean(sheets, n_sheets, camera->least_z,
+                                             camera->rays + 3 * at, stride));
     }
 }
 

@@ -36,12 +36,26 @@ extern const double gn_rig_paper, gn_rig_ink, gn_rig_backdrop;
 /** A camera whose lens has been worked out, for many pictures. Caller's memory, our rays. */
 struct gn_rig_marker_camera {
     struct gn_rig_view view; // its pose is that of the next picture
-    double *rays;            // [2 height + 1][2 width + 1][2]: x/z, y/z every half pixel, owned
+    double *rays;            // [2 height + 1][2 width + 1][3]: a way every half pixel, owned
+    double least_z;          // of a way that the lens lets through
+};
+
+/** A fisheye: r = focal (theta + k[0] theta^3 + k[1] theta^5) up to theta_max, dark outside. */
+struct gn_rig_fisheye {
+    int width, height; // px
+    double center[2];  // px
+    double focal;      // px
+    double k[2];
+    double theta_max; // rad
+    double blur_px;
 };
 
 /** Returns 0 or -ENOMEM. */
 GN_MUST_USE int gn_rig_marker_camera_init(struct gn_rig_marker_camera *camera,
                                           const struct gn_rig_view *view);
+/** The same with a fisheye; only size, pose and blur of camera->view mean something then. */
+GN_MUST_USE int gn_rig_marker_fisheye_init(struct gn_rig_marker_camera *camera,
+                                           const struct gn_rig_fisheye *lens);
 /** Frees the rays and zeroes *camera. */
 void gn_rig_marker_camera_finish(struct gn_rig_marker_camera *camera);
 
