@@ -28,11 +28,9 @@ static int make_pose(const double r[9], struct gn_pose *out)
     return gn_pose_from_matrix(m, out, NULL);
 }
 
-/* The rotation that carries dirs seen to those of the world. *out_spread: how well the directions
- * determine it, 0: not. */
-static int find_orientation(const struct gn_projection *projection,
-                            const struct gn_fisheye_sighting *s, int n, struct gn_pose *out,
-                            double *out_spread)
+int gn_fisheye_find_orientation(const struct gn_projection *projection,
+                                const struct gn_fisheye_sighting *s, int n, struct gn_pose *out,
+                                double *out_spread)
 {
     double b[9] = {0}, r[9], singular[3], seen[3];
     int used = 0;
@@ -278,7 +276,7 @@ int gn_fisheye_fit(const struct gn_projection *projection, int moves,
     if (n > GN_FISHEYE_MAX_SIGHTINGS)
         return gn_error_set(out_error, -EDOM, "%d lamps, at most %d are taken", n,
                             GN_FISHEYE_MAX_SIGHTINGS);
-    if (n < 2 || find_orientation(projection, sightings, n, &f.pose, &spread) < 0 ||
+    if (n < 2 || gn_fisheye_find_orientation(projection, sightings, n, &f.pose, &spread) < 0 ||
         !(spread > 3e-4)) // two directions 2 degrees apart: sin^2 / 4
         return gn_error_set(out_error, -EDOM,
                             "%d lamps seen do not determine an orientation: at least two, well "
@@ -292,113 +290,4 @@ int gn_fisheye_fit(const struct gn_projection *projection, int moves,
     if ((moves & GN_FISHEYE_LENS) && make_polynomial(&f.projection) < 0)
         return gn_error_set(out_error, -EDOM, "no polynomial fits the lens's model");
     return run(&f, sightings, out_fit, out_error);
-}
-
-/* How many candidates an orientation explains. */
-static int count_explained(const struct gn_fisheye_puzzle *c, const double (*seen)[3], int n,
-                           const struct gn_pose *pose, double tolerance, double *out_error_sum)
-{
-    int count = 0;
-    *out_error_sum = 0;
-    for (int i = 0; i < n; i++) {
-        double world[3];
-        gn_pose_rotate(pose, seen[i], world);
-        double angle = get_angle(world, c[i].dir_world);
-        if (angle < tolerance) {
-            count++;
-            *out_error_sum += angle;
-        }
-    }
-    return count;
-}
-
-static bool is_rival(const struct gn_fisheye_puzzle *a, const struct gn_fisheye_puzzle *b)
-{
-    return a->picture == b->picture &&
-           (memcmp(a->xy, b->xy, sizeof(a->xy)) == 0 ||
-            memcmp(a->dir_world, b->dir_world, sizeof(a->dir_world)) == 0);
-}
-
-/* The candidates that an orientation explains best: of rivals the nearest. angle[n] is scratch. */
-static int keep_nearest(const struct gn_fisheye_puzzle *c, const double (*seen)[3], int n,
-                        const struct gn_pose *pose, double tolerance, double *angle,
-                        struct gn_fisheye_sighting *out)
-{
-    int kept = 0;
-    for (int i = 0; i < n; i++) {
-        double world[3];
-        gn_pose_rotate(pose, seen[i], world);
-        angle[i] = get_angle(world, c[i].dir_world);
-    }
-    for (int i = 0; i < n; i++) {
-        bool is_nearest = angle[i] < tolerance;
-        for (int k = 0; k < n && is_nearest; k++)
-            is_nearest = !(is_rival(&c[i], &c[k]) &&
-                           (angle[k] < angle[i] || (angle[k] == angle[i] && k < i)));
-        if (!is_nearest)
-            continue;
-        struct gn_fisheye_sighting *s = &out[kept++];
-        memcpy(s->xy, c[i].xy, sizeof(s->xy));
-        memcpy(s->dir_world, c[i].dir_world, sizeof(s->dir_world));
-        s->error_deg = 0;
-    }
-    return kept;
-}
-
-int gn_fisheye_match(const struct gn_projection *projection,
-                     const struct gn_fisheye_puzzle *candidates, int n, double tolerance_deg,
-                     struct gn_fisheye_sighting *out_sightings, struct gn_error *out_error)
-{
-    int best = 0, found = 0;
-    double best_error = INFINITY, tolerance = tolerance_deg / DEGREE;
-    struct gn_pose best_pose = {{1, 0, 0, 0}, {0}};
-    double(*seen)[3] = calloc((size_t)(n > 0 ? n : 1), sizeof(*seen));
-    double *angle = calloc((size_t)(n > 0 ? n : 1), sizeof(*angle));
-    if (!seen || !angle) {
-        free(seen);
-        free(angle);
-        return gn_error_set(out_error, -ENOMEM, "out of memory");
-    }
-    for (int i = 0; i < n; i++)
-        if (!gn_projection_get_direction(projection, candidates[i].xy[0], candidates[i].xy[1],
-                                         seen[i]))
-            seen[i][0] = seen[i][1] = seen[i][2] = NAN; // outside: near nothing
-    for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++) {
-            const struct gn_fisheye_puzzle *a = &candidates[i], *b = &candidates[j];
-            struct gn_fisheye_sighting two[2] = {{{a->xy[0], a->xy[1]}, {0}, 0},
-                                                 {{b->xy[0], b->xy[1]}, {0}, 0}};
-            memcpy(two[0].dir_world, a->dir_world, sizeof(a->dir_world));
-            memcpy(two[1].dir_world, b->dir_world, sizeof(b->dir_world));
-            double of_seen = get_angle(seen[i], seen[j]), spread, error;
-            double of_world = get_angle(a->dir_world, b->dir_world);
-            struct gn_pose pose;
-            if (fabs(of_seen - of_world) > 2 * tolerance || !(of_seen > 0.03) ||
-                find_orientation(projection, two, 2, &pose, &spread) < 0)
-                continue;
-            int count =
-                count_explained(candidates, (const double(*)[3])seen, n, &pose, tolerance, &error);
-            if (count > best || (count == best && error < best_error)) {
-                best = count;
-                best_error = error;
-                best_pose = pose;
-            }
-        }
-    // Again from all that was kept: the first orientation leans on two of them only.
-    for (int round = 0; round < 3 && best >= 2; round++) {
-        double spread;
-        found = keep_nearest(candidates, (const double(*)[3])seen, n, &best_pose, tolerance, angle,
-                             out_sightings);
-        if (find_orientation(projection, out_sightings, found, &best_pose, &spread) < 0)
-            break;
-    }
-    free(angle);
-    free(seen);
-    if (found < 2)
-        return gn_error_set(out_error, -EDOM,
-                            "no orientation brings two spots within %.1f degrees of their lamps: "
-                            "are the directions from the probe to the lamps, in the marker's "
-                            "frame, and is the projection right?",
-                            tolerance_deg);
-    return found;
 }

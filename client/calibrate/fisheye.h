@@ -21,6 +21,14 @@ struct gn_fisheye_sighting {
     double error_deg; // out
 };
 
+/**
+ * The rotation that carries the directions seen to those of the world best (Wahba 1965), without
+ * translation. *out_spread: how well they determine it, 0: not. Returns 0 or -EDOM.
+ */
+GN_MUST_USE int gn_fisheye_find_orientation(const struct gn_projection *projection,
+                                            const struct gn_fisheye_sighting *sightings, int n,
+                                            struct gn_pose *out, double *out_spread);
+
 /** What may move besides the orientation. Each needs more lamps, spread over the picture. */
 enum {
     GN_FISHEYE_CENTER = 1, // 2 numbers
@@ -57,16 +65,21 @@ struct gn_fisheye_puzzle {
     int picture;         // that shows the spot
 };
 
+/** Pairs of spots and lights that are matched. */
+#define GN_FISHEYE_MAX_CANDIDATES 4096
+
 /**
  * Finds which spot is which light over all pictures together: every pair of candidates that lie
  * apart gives an orientation; the one that explains most of them within tolerance_deg wins. Of a
  * picture's spots near one light, and of lights near one spot, only the nearest counts then: flares
  * stay out. candidates[n]: all pairs of a picture's spots and lights. out_sightings has room for n.
- * Returns how many sightings, or -EDOM, -ENOMEM and a sentence.
+ * n in [0, GN_FISHEYE_MAX_CANDIDATES]. It takes some seconds at most: where pairs are too many, one
+ * in *out_stride is tried, else that is 1. Returns how many sightings, or -EDOM, -ENOMEM and a
+ * sentence.
  */
 GN_MUST_USE int gn_fisheye_match(const struct gn_projection *projection,
                                  const struct gn_fisheye_puzzle *candidates, int n,
                                  double tolerance_deg, struct gn_fisheye_sighting *out_sightings,
-                                 struct gn_error *out_error);
+                                 int *out_stride, struct gn_error *out_error);
 
 #endif

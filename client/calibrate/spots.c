@@ -195,8 +195,42 @@ static int find_levels(const struct gn_image *image, double *out_dark, double *o
     return 0;
 }
 
-int gn_circle_find_disc(const struct gn_image *codes, struct gn_circle *out_circle,
-                        struct gn_error *out_error)
+/* The mean along a ray, over what the picture shows of it; NAN: nothing. */
+static double get_mean(const struct gn_image *image, const double from[2], const double way[2],
+                       double near, double far)
+{
+    double sum = 0, v;
+    int n = 0;
+    for (double r = near; r <= far; r += 0.5)
+        if (sample(image, from[0] + r * way[0], from[1] + r * way[1], &v)) {
+            sum += v;
+            n++;
+        }
+    return n > 0 ? sum / n : NAN;
+}
+
+/* Moves r along a ray to where the light is halfway between what lies inside and outside there; it
+ * stays where the picture does not show both. */
+static double refine_edge(const struct gn_image *light, const double from[2], const double way[2],
+                          double r)
+{
+    double reach = fmax(4, 0.02 * r), before = NAN, now;
+    double inside = get_mean(light, from, way, r - 2 * reach, r - reach);
+    double outside = get_mean(light, from, way, r + reach, r + 2 * reach);
+    double half = (inside + outside) / 2;
+    if (!(inside > 2 * outside))
+        return r;
+    for (double at = r + reach; at > r - reach; at -= 0.25, before = now) {
+        if (!sample(light, from[0] + at * way[0], from[1] + at * way[1], &now))
+            now = NAN;
+        if (now > half && before <= half)
+            return at + 0.25 * (now - half) / (now - before);
+    }
+    return r;
+}
+
+int gn_circle_find_disc(const struct gn_image *codes, const struct gn_image *light,
+                        struct gn_circle *out_circle, struct gn_error *out_error)
 {
     double dark, typical, points[2 * MAX_RAYS], centre[2] = {0}, n_bright = 0;
     if (find_levels(codes, &dark, &typical) < 0)
@@ -212,16 +246,18 @@ int gn_circle_find_disc(const struct gn_image *codes, struct gn_circle *out_circ
     int n = 0;
     // From outside inwards: what is dark within the circle does not end it.
     for (int ray = 0; ray < 360 && n_bright > 0; ray++) {
-        double dx = cos(ray * PI / 180), dy = sin(ray * PI / 180), before = NAN, now;
+        const double from[2] = {centre[0] / n_bright, centre[1] / n_bright};
+        const double way[2] = {cos(ray * PI / 180), sin(ray * PI / 180)};
+        double before = NAN, now;
         for (double r = hypot(codes->width, codes->height); r > 1; r -= 0.5) {
-            double x = centre[0] / n_bright + r * dx, y = centre[1] / n_bright + r * dy;
-            if (!sample(codes, x, y, &now))
+            if (!sample(codes, from[0] + r * way[0], from[1] + r * way[1], &now))
                 continue;
             if (now > bound) {
                 if (before < bound) { // not cut off by the picture's edge
-                    double t = 0.5 * (now - bound) / (now - before);
-                    points[2 * n] = x + t * dx;
-                    points[2 * n++ + 1] = y + t * dy;
+                    double edge =
+                        refine_edge(light, from, way, r + 0.5 * (now - bound) / (now - before));
+                    points[2 * n] = from[0] + edge * way[0];
+                    points[2 * n++ + 1] = from[1] + edge * way[1];
                 }
                 break;
             }

@@ -47,11 +47,12 @@ GN_MUST_USE int gn_circle_fit(const double *xy, int n, double tolerance,
 
 /**
  * The outline of the disc of light in a dark surround, a fisheye's image circle: along 360 rays
- * from the centre of light, where the light falls below half of what lies inside. codes: 1 channel.
- * Returns 0, or -EDOM and a sentence.
+ * from the centre of light, where the codes fall below half of what lies inside, and then exactly
+ * where the light does: codes of a log sensor rise a pixel and more outside a blurred rim. codes,
+ * light (linear, the same picture): 1 channel. Returns 0, or -EDOM and a sentence.
  */
-GN_MUST_USE int gn_circle_find_disc(const struct gn_image *codes, struct gn_circle *out_circle,
-                                    struct gn_error *out_error);
+GN_MUST_USE int gn_circle_find_disc(const struct gn_image *codes, const struct gn_image *light,
+                                    struct gn_circle *out_circle, struct gn_error *out_error);
 
 /**
  * The outline of a mirror ball near `guess`: the steepest change of the codes along 720 rays from

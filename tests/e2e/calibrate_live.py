@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: ISC
 """gnomon calibrate with a GigE Vision camera on loopback, which sees what is drawn here.
 
-usage: calibrate_live.py GNOMON FAKE_GIGE
+usage: calibrate_live.py GNOMON FAKE_GIGE FISHEYE_SHOTS
 """
 import json
 import math
 import os
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -20,7 +21,7 @@ from chart import CHART  # noqa: E402
 from folder import Folder  # noqa: E402
 from pictures import png_bytes, read_png  # noqa: E402
 
-GNOMON, FAKE = sys.argv[1:3]
+GNOMON, FAKE, FISHEYE_SHOTS = sys.argv[1:4]
 WIDTH, HEIGHT, FOCAL, CENTRE = 240, 180, 220, (118.3, 91.6)
 COLUMNS, ROWS = 7, 6
 # A machine that stands still for a second does not answer for its camera.
@@ -292,6 +293,24 @@ def test_response_ends():
         assert os.listdir(f.path) == ['light.png']
 
 
+def test_probe_sees_marker():
+    """A fisheye with a marker in it, the mean of 12-bit pictures, is as good as the file."""
+    markers = {'dictionary': '4x4_50', 'bodies': [{'name': 'world', 'markers': [{'id': 7, 'size': .1}]},
+                                                  {'name': 'post', 'markers': [{'id': 20, 'size': .1}]}]}
+    with Folder() as f:
+        f.write('markers.json', json.dumps(markers).encode())
+        subprocess.run([FISHEYE_SHOTS, f.at('markers.json'), f.path], check=True, capture_output=True)
+        shutil.copy(f.at('probe.json'), f.at('files.json'))
+        common = ['--find-circle', '--projection', 'fisheye-equidistant', '--markers', f.at('markers.json')]
+        run('probe', '--files', f.at('near-0.png'), *common, '--out', f.at('files.json'))
+        with Camera(f.at('near-0.png'), 0, width=480, height=480):
+            out = run('probe', '--gige', '127.0.0.1', '--pixel-format', 'Mono12', '--frames', 3, *common,
+                      '--out', f.at('probe.json'))
+        assert 'camera: 2 markers' in out, out
+        for a, b in zip(*(read_camera(f.at(name))['orientation'] for name in ('files.json', 'probe.json'))):
+            assert abs(a - b) < 1e-6, (a, b)
+
+
 def test_misuse():
     """Sources that are none, several, or not for this."""
     with Folder() as f:
@@ -306,8 +325,8 @@ def test_misuse():
 
 
 def main():
-    tests = [test_intrinsics, test_interrupt, test_probe, test_chart, test_stack, test_response_ends,
-             test_misuse]
+    tests = [test_intrinsics, test_interrupt, test_probe, test_probe_sees_marker, test_chart, test_stack,
+             test_response_ends, test_misuse]
     print('1..%d' % len(tests))
     failed = 0
     for number, test in enumerate(tests, 1):

@@ -115,7 +115,8 @@ static void test_rig_frames(void **unused)
         }
         struct gn_error e = {0};
         struct gn_fisheye_fit fit;
-        int seen = gn_fisheye_match(&projection, candidates, n, 4, sightings, &e);
+        int stride = 0,
+            seen = gn_fisheye_match(&projection, candidates, n, 4, sightings, &stride, &e);
         if (seen < 0 || gn_fisheye_fit(&projection, 0, sightings, seen, &fit, &e) < 0)
             fail_msg("%s", e.text);
         double error = get_difference_deg(&fit.world_from_probe, truth);
@@ -208,8 +209,9 @@ static void test_refusals(void **unused)
     assert_int_equal(gn_fisheye_fit(&p, GN_FISHEYE_LENS | GN_FISHEYE_CENTER, s + 2, 4, &fit, &e),
                      -EDOM);
     assert_non_null(strstr(e.text, "too few"));
+    int stride = 0;
     struct gn_fisheye_puzzle wrong[4] = {{{150, 150}, {0, 0, 1}}, {{250, 150}, {0, 0.1, 0.995}}};
-    assert_int_equal(gn_fisheye_match(&p, wrong, 2, 3, s, &e), -EDOM);
+    assert_int_equal(gn_fisheye_match(&p, wrong, 2, 3, s, &stride, &e), -EDOM);
     assert_non_null(strstr(e.text, "within 3.0 degrees"));
     assert_int_equal(n, 20);
 }
@@ -232,11 +234,62 @@ static void test_flares(void **unused)
         memcpy(candidates[i].dir_world, lamps[i / 2].dir_world, sizeof(lamps[i / 2].dir_world));
         candidates[i].xy[1] += i % 2 && i % 3 ? 4 : 0;
     }
-    int n = gn_fisheye_match(&p, candidates, 24, 4, s, &e);
+    int stride = 0, n = gn_fisheye_match(&p, candidates, 24, 4, s, &stride, &e);
     assert_int_equal(n, 12);
     assert_int_equal(gn_fisheye_fit(&p, 0, s, n, &fit, &e), 0);
     printf("# flares: %.4f degrees off\n", fit.worst_deg);
     assert_true(fit.worst_deg < 0.01);
+}
+
+/* More pairs than can all be tried: it says so, and finds the lamps among them. */
+static void test_many_pairs(void **unused)
+{
+    (void)unused;
+    enum { LAMPS = 45 };
+    struct gn_projection p = make_projection();
+    const struct gn_pose truth = {{0.8, 0, 0.6, 0}, {0}};
+    struct gn_fisheye_sighting lamps[LAMPS];
+    struct gn_fisheye_puzzle *candidates = calloc((size_t)LAMPS * LAMPS, sizeof(*candidates));
+    struct gn_fisheye_sighting *found = calloc((size_t)LAMPS * LAMPS, sizeof(*found));
+    struct gn_fisheye_fit fit;
+    struct gn_error e = {0};
+    int stride = 0;
+    assert_true(candidates && found);
+    assert_int_equal(see(&p, &truth, LAMPS, 1.5, 0.1, lamps), LAMPS);
+    for (int i = 0; i < LAMPS * LAMPS; i++) {
+        memcpy(candidates[i].xy, lamps[i / LAMPS].xy, sizeof(lamps[0].xy));
+        memcpy(candidates[i].dir_world, lamps[i % LAMPS].dir_world, sizeof(lamps[0].dir_world));
+    }
+    int n = gn_fisheye_match(&p, candidates, LAMPS * LAMPS, 2, found, &stride, &e);
+    printf("# %d pairs: %d found, one orientation in %d tried\n", LAMPS * LAMPS, n, stride);
+    assert_true(n == LAMPS && stride > 1);
+    assert_int_equal(gn_fisheye_fit(&p, 0, found, n, &fit, &e), 0);
+    assert_true(get_difference_deg(&fit.world_from_probe, truth.rotation) < 0.05);
+    free(candidates);
+    free(found);
+}
+
+/* Codes of a log sensor rise far outside a blurred rim; the light does not. */
+static void test_rim_of_codes(void **unused)
+{
+    (void)unused;
+    struct gn_image light, codes;
+    struct gn_circle circle;
+    const struct gn_rig_log_sensor sensor = gn_rig_make_log_sensor(0.3, 30);
+    assert_int_equal(gn_image_init(&light, SIZE, SIZE, 1), 0);
+    assert_int_equal(gn_image_init(&codes, SIZE, SIZE, 1), 0);
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        double r = hypot(i % SIZE + 0.5 - 151.2, i / SIZE + 0.5 - 148.6);
+        light.data[i] = (float)(0.5 * 0.2 * (1 + erf((130 - r) / (sqrt(2) * 0.9))));
+        codes.data[i] = (float)(gn_rig_encode_log12(&sensor, (double)light.data[i]) / 4095.0);
+    }
+    assert_int_equal(gn_circle_find_disc(&codes, &light, &circle, NULL), 0);
+    printf("# rim of codes: radius %.2f, in truth 130\n", circle.radius);
+    assert_true(fabs(circle.radius - 130) < 0.15 && fabs(circle.center[0] - 151.2) < 0.1);
+    assert_int_equal(gn_circle_find_disc(&codes, &codes, &circle, NULL), 0);
+    assert_true(circle.radius > 130.5); // by the codes alone
+    gn_image_finish(&light);
+    gn_image_finish(&codes);
 }
 
 /* A disc of uneven light in the dark, its outline cut by the picture's edge. */
@@ -255,14 +308,14 @@ static void test_image_circle(void **unused)
                 (float)(0.01 + edge * (0.3 + 0.2 * sin(0.03 * x) * cos(0.05 * y) +
                                        (hypot(x - 260, y - 90) < 9 ? 0.4 : 0)));
         }
-    if (gn_circle_find_disc(&image, &circle, &e) < 0)
+    if (gn_circle_find_disc(&image, &image, &circle, &e) < 0)
         fail_msg("%s", e.text);
     printf("# disc: %.2f %.2f radius %.2f\n", circle.center[0], circle.center[1], circle.radius);
     assert_true(fabs(circle.center[0] - 203.3) < 0.3 && fabs(circle.center[1] - 128.7) < 0.3);
     assert_true(fabs(circle.radius - 137.2) < 0.6);
     for (int i = 0; i < 400 * 260; i++)
         image.data[i] = 0.3f;
-    assert_int_equal(gn_circle_find_disc(&image, &circle, &e), -EDOM);
+    assert_int_equal(gn_circle_find_disc(&image, &image, &circle, &e), -EDOM);
     assert_non_null(strstr(e.text, "no image circle"));
     gn_image_finish(&image);
 }
@@ -364,6 +417,7 @@ int main(void)
         cmocka_unit_test(test_refusals),   cmocka_unit_test(test_image_circle),
         cmocka_unit_test(test_ball),       cmocka_unit_test(test_mask),
         cmocka_unit_test(test_wahba),      cmocka_unit_test(test_flares),
+        cmocka_unit_test(test_many_pairs), cmocka_unit_test(test_rim_of_codes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
