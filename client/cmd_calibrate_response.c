@@ -112,15 +112,15 @@ static const struct gn_program program = {
              "[OPTION]...",
     .summary = "Measures what light the codes of a camera or probe stand for, from pictures of one "
                "still scene at several exposures, its gain and white balance locked.",
-    .notes =
-        "Examples:\n"
-        "  gnomon calibrate response --chart 'shots/*.png' --full-scale 4095 \\\n"
-        "      --out probe.json --plot residuals.svg\n"
-        "  gnomon calibrate response --stack 'stack/*.jpg' \\\n"
-        "      --times 1/60,1/30,1/15,1/8,1/4 --out probe.json\n"
-        "  gnomon calibrate response --gige any --exposures 4,0.25,1,16,64ms --keep shots \\\n"
-        "      --out probe.json --plot residuals.svg --picture found.png\n"
-        "  gnomon calibrate response --v4l2 any --live stack --exposures auto --out probe.json\n",
+    .notes = "Examples:\n"
+             "  gnomon calibrate response --chart 'shots/*.png' --full-scale 4095 \\\n"
+             "      --out probe.json --plot residuals.svg\n"
+             "  gnomon calibrate response --stack 'stack/*.jpg' \\\n"
+             "      --times 1/60,1/30,1/15,1/8,1/4 --out probe.json\n"
+             "  gnomon calibrate response --gige any --exposures 4,0.25,1,16,64ms \\\n"
+             "      --keep shots --out probe.json --plot residuals.svg --picture found.png\n"
+             "  gnomon calibrate response --v4l2 any --live stack --exposures auto \\\n"
+             "      --out probe.json\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
