@@ -10,16 +10,26 @@
 
 #include "client/feature.h"
 #include "client/vision/markers.h"
+#include "common/clock.h"
 #include "common/device_json.h"
 #include "common/json.h"
 #include "common/png.h"
 
+/** So many pictures in a row must say that something is wrong before that is told. */
+enum { SURE_AFTER = 3 };
+/** Between two lines that tell it. */
+static const int64_t tell_interval_ns = INT64_C(20000000000);
+
 struct gn_poses {
     struct gn_bodies bodies;
     struct gn_tracker *tracker;
-    int world;       // its body
-    const char *dir; // for --debug-markers, borrowed; NULL: none
-    FILE *log;       // NULL: none
+    int world;          // its body
+    const char *dir;    // for --debug-markers, borrowed; NULL: none
+    FILE *log;          // NULL: none
+    const char *source; // where the bodies are listed, borrowed
+    int n_doubtful;     // pictures in a row that speak against that
+    bool has_told;
+    int64_t told_ns;
 };
 
 bool gn_poses_is_asked(const struct gn_options *options)
@@ -79,6 +89,7 @@ int gn_poses_open(const struct gn_options *options, const struct gn_camera *came
     struct gn_poses *p = calloc(1, sizeof(*p));
     if (!p)
         return gn_error_set(out_error, -ENOMEM, "out of memory");
+    p->source = path ? path : "--marker";
     p->dir = gn_options_get_string(options, NULL, NULL, "debug-markers");
     int err = path ? gn_bodies_read_file(path, &p->bodies, out_error)
                    : gn_bodies_read_text(gn_options_get_string(options, NULL, NULL, "marker"),
@@ -145,11 +156,33 @@ static int write_line(const struct gn_poses *p, const struct gn_capture *capture
     return err;
 }
 
+/** Says what is wrong with the list of the bodies. */
+static void tell(struct gn_poses *p)
+{
+    char why[768];
+    if (!gn_tracker_explain(p->tracker, why, sizeof(why)))
+        return;
+    fprintf(stderr, "gnomon: %s: %s\n", p->source, why);
+    p->has_told = true;
+    p->told_ns = gn_clock_get_monotonic_ns();
+}
+
+/** Tells it once it is certain, and not often. */
+static void doubt(struct gn_poses *p)
+{
+    p->n_doubtful = gn_tracker_is_doubtful(p->tracker) ? p->n_doubtful + 1 : 0;
+    if (p->n_doubtful >= SURE_AFTER &&
+        (!p->has_told || gn_clock_get_monotonic_ns() - p->told_ns >= tell_interval_ns))
+        tell(p);
+}
+
 int gn_poses_take(struct gn_poses *p, const struct gn_capture *capture, struct gn_error *out_error)
 {
     int64_t time_ns = gn_poses_get_time_ns(capture);
     int n_seen = gn_tracker_update(p->tracker, capture, time_ns, out_error);
     int err = n_seen < 0 ? n_seen : 0;
+    if (!err)
+        doubt(p);
     if (!err && p->dir)
         err = draw(p, capture->name, out_error);
     if (!err && p->log)
@@ -181,11 +214,13 @@ int gn_poses_find_body(const struct gn_poses *p, const char *name)
     return gn_bodies_find(&p->bodies, name);
 }
 
-void gn_poses_print(const struct gn_poses *p, FILE *out)
+void gn_poses_print(struct gn_poses *p, FILE *out)
 {
     struct gn_tracker_counts c;
     if (!p)
         return;
+    if (p->n_doubtful > 0 && !p->has_told)
+        tell(p);
     gn_tracker_get_counts(p->tracker, &c);
     fprintf(out, "markers: %llu poses from %llu pictures, %.2f ms of a core each",
             (unsigned long long)c.n_seen, (unsigned long long)c.n_pictures,
@@ -193,6 +228,9 @@ void gn_poses_print(const struct gn_poses *p, FILE *out)
     if (c.n_flips_rejected + c.n_flips_corrected > 0)
         fprintf(out, "; %llu flips rejected, %llu corrected",
                 (unsigned long long)c.n_flips_rejected, (unsigned long long)c.n_flips_corrected);
+    if (c.n_misfits > 0)
+        fprintf(out, "; %llu times they were not where they are listed",
+                (unsigned long long)c.n_misfits);
     if (c.n_rest > 0)
         fprintf(out, "; at rest steps of %.3f mm RMS, %.3f as measured",
                 1e3 * sqrt(c.rest_steady_m2 / (double)c.n_rest),

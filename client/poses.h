@@ -73,8 +73,9 @@ GN_MUST_USE int gn_poses_write_to(struct gn_poses *poses, const char *dir,
 int64_t gn_poses_get_time_ns(const struct gn_capture *capture);
 
 /**
- * Looks at the picture. Returns how many bodies are seen in it, or a negative errno and a
- * sentence.
+ * Looks at the picture. Where some in a row speak against the list of the markers, a line on
+ * stderr says what does not fit, seldom. Returns how many bodies are seen in it, or a negative
+ * errno and a sentence.
  */
 GN_MUST_USE int gn_poses_take(struct gn_poses *poses, const struct gn_capture *capture,
                               struct gn_error *out_error);
@@ -90,7 +91,7 @@ bool gn_poses_get_in_camera(const struct gn_poses *poses, int body,
 int gn_poses_find_body(const struct gn_poses *poses, const char *name);
 
 /** A line or two about what was seen, how still, how late and how dear. NULL-safe. */
-void gn_poses_print(const struct gn_poses *poses, FILE *out);
+void gn_poses_print(struct gn_poses *poses, FILE *out);
 
 /** NULL-safe; nulls *poses. */
 void gn_poses_close(struct gn_poses **poses);

@@ -39,3 +39,16 @@ double gn_grey_sample(const struct gn_grey *g, double x, double y)
     return (1 - v) * ((1 - u) * (double)l[p[0]] + u * (double)l[p[1]]) +
            v * ((1 - u) * (double)l[q[0]] + u * (double)l[q[1]]);
 }
+
+bool gn_quad_sample_cells(const struct gn_grey *g, int n, double corners_px[4][2],
+                          double *out_light)
+{
+    for (int i = 0; i < n * n; i++) {
+        double p[2];
+        gn_quad_map(corners_px, (i % n + 0.5) / n, (i / n + 0.5) / n, p);
+        if (!(p[0] >= 1 && p[1] >= 1 && p[0] <= g->width - 1 && p[1] <= g->height - 1))
+            return false;
+        out_light[i] = gn_grey_sample(g, p[0], p[1]);
+    }
+    return true;
+}

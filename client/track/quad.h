@@ -24,6 +24,11 @@ void gn_quad_map(double corners_px[4][2], double u, double v, double out_px[stat
 /** The length of its shortest side, px. */
 double gn_quad_get_side(double corners_px[4][2]);
 
+/** The light in the middle of each of n x n cells of a square, from its first corner; false where
+ * one lies at the picture's border. */
+bool gn_quad_sample_cells(const struct gn_grey *grey, int n, double corners_px[4][2],
+                          double *out_light);
+
 /** Linear light at a picture position, between the centres of four pixels, which must exist. */
 double gn_grey_sample(const struct gn_grey *grey, double x, double y);
 

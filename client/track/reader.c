@@ -84,20 +84,6 @@ const struct gn_pattern *gn_reader_get_pattern(const struct gn_reader *r, int id
     return NULL;
 }
 
-/** The light in the middle of each cell. False where one lies at the picture's border. */
-static bool sample_cells(const struct gn_grey *g, int n, double corners_px[4][2],
-                         double light[static MAX_CELLS])
-{
-    for (int i = 0; i < n * n; i++) {
-        double p[2];
-        gn_quad_map(corners_px, (i % n + 0.5) / n, (i / n + 0.5) / n, p);
-        if (!(p[0] >= 1 && p[1] >= 1 && p[0] <= g->width - 1 && p[1] <= g->height - 1))
-            return false;
-        light[i] = gn_grey_sample(g, p[0], p[1]);
-    }
-    return true;
-}
-
 /** Correlation of the cells with a pattern. */
 static double correlate(const double *light, const uint8_t *white, int n)
 {
@@ -158,7 +144,7 @@ bool gn_reader_read(const struct gn_reader *r, const struct gn_grey *grey, doubl
 {
     double light[MAX_CELLS] = {0}, found[4][2];
     int turn = 0;
-    if (r->n_entries == 0 || !sample_cells(grey, r->cells, corners_px, light))
+    if (r->n_entries == 0 || !gn_quad_sample_cells(grey, r->cells, corners_px, light))
         return false;
     const struct entry *e = guess(r, light, &turn);
     if (!e)
@@ -166,7 +152,7 @@ bool gn_reader_read(const struct gn_reader *r, const struct gn_grey *grey, doubl
     for (int k = 0; k < 4; k++)
         memcpy(found[k], corners_px[(k + turn) % 4], sizeof(found[k]));
     double correlation = gn_pattern_fit(grey, &e->pattern, found);
-    if (!(correlation >= min_correlation) || !sample_cells(grey, r->cells, found, light) ||
+    if (!(correlation >= min_correlation) || !gn_quad_sample_cells(grey, r->cells, found, light) ||
         count_wrong(light, e->white, r->cells) > r->max_wrong)
         return false;
     out->id = e->id;

@@ -21,7 +21,8 @@ struct gn_search {
     struct gn_marker_finder *finders[N_FINDERS];
     struct gn_reader *reader;
     struct gn_marker_sighting read[GN_SEARCH_MAX_FOUND];
-    double quads[MAX_QUADS][4][2];
+    int n_unread;
+    double unread[MAX_QUADS][4][2], quads[MAX_QUADS][4][2];
 };
 
 int gn_search_create(const struct gn_search_options *o, struct gn_search **out_search,
@@ -71,6 +72,12 @@ const struct gn_pattern *gn_search_get_pattern(const struct gn_search *s, int id
     return gn_reader_get_pattern(s->reader, id);
 }
 
+double (*gn_search_get_unread(struct gn_search *s, int *out_n))[4][2]
+{
+    *out_n = s->n_unread;
+    return s->unread;
+}
+
 static void get_middle(const struct gn_marker_sighting *m, double out[static 2])
 {
     for (int a = 0; a < 2; a++)
@@ -108,14 +115,16 @@ static bool refine(const struct gn_search *s, const struct gn_grey *grey, double
     return pattern && gn_pattern_fit(grey, pattern, m->corners) >= min_correlation;
 }
 
-/** Reads a square of OpenCV's. */
-static void read_square(const struct gn_search *s, const struct gn_grey *grey, double to_edge_px,
+/** Reads a square of OpenCV's; its corners become wider. */
+static bool read_square(const struct gn_search *s, const struct gn_grey *grey, double to_edge_px,
                         double corners_px[4][2], struct gn_search_finds *finds)
 {
     struct gn_marker_sighting m;
     gn_edges_widen(corners_px, to_edge_px);
-    if (gn_reader_read(s->reader, grey, corners_px, &m))
-        add(finds, &m);
+    if (!gn_reader_read(s->reader, grey, corners_px, &m))
+        return false;
+    add(finds, &m);
+    return true;
 }
 
 /** One finder's squares. Of small ones there are so many that OpenCV's reading is not believed. */
@@ -132,7 +141,7 @@ static int look(struct gn_search *s, int which, const struct gn_grey *grey,
         return err;
     for (int i = 0; i < n; i++) {
         if (which == SMALL) {
-            read_square(s, grey, to_edge_px, s->read[i].corners, finds);
+            (void)read_square(s, grey, to_edge_px, s->read[i].corners, finds);
         } else if (!is_known(finds, &s->read[i])) {
             finds->n_coarse += !refine(s, grey, to_edge_px, &s->read[i]);
             add(finds, &s->read[i]);
@@ -140,7 +149,8 @@ static int look(struct gn_search *s, int which, const struct gn_grey *grey,
     }
     n = gn_marker_finder_get_unread(s->finders[which], MAX_QUADS, s->quads);
     for (int i = 0; i < n; i++)
-        read_square(s, grey, to_edge_px, s->quads[i], finds);
+        if (!read_square(s, grey, to_edge_px, s->quads[i], finds) && which == ALL)
+            memcpy(s->unread[s->n_unread++], s->quads[i], sizeof(s->quads[i]));
     return 0;
 }
 
@@ -161,6 +171,7 @@ int gn_search_find(struct gn_search *s, const struct gn_grey *grey,
                    struct gn_search_finds *out_finds, struct gn_error *out_error)
 {
     out_finds->n_found = out_finds->n_coarse = 0;
+    s->n_unread = 0;
     int err = look(s, ALL, grey, window, out_finds, out_error);
     if (!err && with_small && !has_all(s, out_finds))
         err = look(s, SMALL, grey, window, out_finds, out_error);

@@ -48,6 +48,12 @@ GN_MUST_USE int gn_search_find(struct gn_search *search, const struct gn_grey *g
                                const struct gn_marker_window *window, bool with_small,
                                struct gn_search_finds *out_finds, struct gn_error *out_error);
 
+/**
+ * Squares in which the last gn_search_find() read no marker of its dictionary, of the size that
+ * OpenCV reads. Borrowed until the next.
+ */
+double (*gn_search_get_unread(struct gn_search *search, int *out_n))[4][2];
+
 /** What a marker that is looked for looks like. NULL: it is not. */
 const struct gn_pattern *gn_search_get_pattern(const struct gn_search *search, int id);
 

@@ -4,12 +4,14 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include "client/track/axes.h"
 #include "client/track/grey.h"
+#include "client/track/misfit.h"
 #include "client/track/pose_choice.h"
 #include "common/jpeg.h"
 
@@ -20,7 +22,8 @@ static const double rest_speed = 0.005, rest_turn = 0.02;
 struct memory {
     struct gn_pose_filter filter;
     struct gn_pose_choice choice;
-    bool was_seen;
+    bool was_seen; // in the last picture
+    bool was_ever_seen;
     struct gn_pose last_measured, last_steady;
 };
 
@@ -160,6 +163,20 @@ static int take_fits(struct gn_tracker *t, int body, int64_t time_ns,
     return 0;
 }
 
+/** Whether the markers are where they are listed; returns whether they are so far from there that
+ * their pose says nothing. Of one marker alone that cannot be told. */
+static bool judge_fit(struct gn_tracker *t, struct gn_tracked_body *b, double rms_px)
+{
+    double side_px = 0;
+    if (b->n_markers < 2)
+        return false;
+    for (int i = 0; i < b->n_markers; i++)
+        side_px += gn_quad_get_side(t->seen + 4 * i) / b->n_markers;
+    b->is_misfit = rms_px > gn_misfit_get_limit(side_px);
+    t->counts.n_misfits += b->is_misfit;
+    return rms_px > gn_misfit_get_gross_limit(side_px);
+}
+
 /** Fits one body to its sightings. 1: seen, 0: not, or a negative errno. */
 static int fit_body(struct gn_tracker *t, int body, int64_t time_ns, struct gn_error *out_error)
 {
@@ -183,6 +200,9 @@ static int fit_body(struct gn_tracker *t, int body, int64_t time_ns, struct gn_e
                                     (const double(*)[2])t->seen, n, GN_TRACKER_CORNER_ERROR_PX,
                                     fits, out_error);
     b->n_markers = n / 4;
+    t->memory[body].was_ever_seen = t->memory[body].was_ever_seen || n > 0;
+    if (n_fits >= 0 && judge_fit(t, b, n_fits > 0 ? fits[0].rms_px : INFINITY) && n_fits > 0)
+        n_fits = 0;
     for (int i = 0; i < n_fits; i++) {
         double found_px = sqrt(fits[i].sum_px2 / (2 * n - 6));
         double share = fmax(1, found_px / GN_TRACKER_CORNER_ERROR_PX);
@@ -200,7 +220,7 @@ int gn_tracker_update(struct gn_tracker *t, const struct gn_capture *capture, in
     double start_s = get_processor_s();
     int n_seen = 0;
     for (int i = 0; i < GN_BODY_MAX_BODIES; i++)
-        t->tracked[i].is_seen = false;
+        t->tracked[i].is_seen = t->tracked[i].is_misfit = false;
     int err = gn_grey_from_capture(capture, t->jpeg, &t->grey_picture, out_error);
     if (err)
         return err;
@@ -235,6 +255,91 @@ bool gn_tracker_get_between(const struct gn_tracker *t, int base, int body,
     if (!t->tracked[body].is_seen || !gn_tracker_get_camera(t, base, out_base_from_body))
         return false;
     gn_pose_multiply(out_base_from_body, &t->tracked[body].camera_from_body, out_base_from_body);
+    return true;
+}
+
+static int compare_ids(const void *a, const void *b)
+{
+    return ((const struct gn_marker_sighting *)a)->id - ((const struct gn_marker_sighting *)b)->id;
+}
+
+/** Explains the misfit of one body. */
+static bool explain_body(const struct gn_tracker *t, int body, char *out, size_t out_bytes)
+{
+    static const int max_listed = 8;
+    const struct gn_body *known = &t->bodies->bodies[body];
+    struct gn_marker_sighting *own = calloc(GN_BODY_MAX_MARKERS, sizeof(*own));
+    int n_seen, owner, marker, n = 0;
+    const struct gn_marker_sighting *seen = gn_watch_get_sightings(t->watch, &n_seen);
+    char why[256] = "";
+    for (int i = 0; i < n_seen && own && n < GN_BODY_MAX_MARKERS; i++)
+        if (gn_bodies_find_marker(t->bodies, seen[i].id, &owner, &marker) && owner == body)
+            own[n++] = seen[i];
+    if (own)
+        qsort(own, (size_t)n, sizeof(*own), compare_ids);
+    const struct gn_misfit_view view = {
+        .camera = &t->camera, .body = known, .seen = own, .n_seen = n};
+    bool is_wrong = own && gn_misfit_explain(&view, why, sizeof(why));
+    size_t at = is_wrong
+                    ? (size_t)snprintf(out, out_bytes, "the markers of \"%s\" (seen: ", known->name)
+                    : out_bytes;
+    for (int i = 0; i < n && i < max_listed && at < out_bytes; i++)
+        at += (size_t)snprintf(out + at, out_bytes - at, i ? ", %d" : "%d", own[i].id);
+    if (at < out_bytes)
+        snprintf(out + at, out_bytes - at, "%s) are not where they are listed: %s",
+                 n > max_listed ? ", ..." : "", why);
+    free(own);
+    return is_wrong;
+}
+
+/** Markers that no body has, where a body was never seen; or of another dictionary, where nothing
+ * is. */
+static bool get_strangers(const struct gn_tracker *t, struct gn_foreign_finds *out)
+{
+    bool is_one_missing = false;
+    int n_seen;
+    for (int i = 0; i < t->bodies->n_bodies; i++)
+        is_one_missing = is_one_missing || !t->memory[i].was_ever_seen;
+    *out = *gn_watch_get_strangers(t->watch);
+    if (is_one_missing && out->n_ids > 0)
+        return true;
+    (void)gn_watch_get_sightings(t->watch, &n_seen);
+    return n_seen == 0 && gn_watch_get_foreign(t->watch, out) &&
+           out->dictionary != t->bodies->dictionary;
+}
+
+bool gn_tracker_is_doubtful(const struct gn_tracker *t)
+{
+    struct gn_foreign_finds strangers;
+    for (int i = 0; i < t->bodies->n_bodies; i++)
+        if (t->tracked[i].is_misfit)
+            return true;
+    return get_strangers(t, &strangers);
+}
+
+bool gn_tracker_explain(const struct gn_tracker *t, char *out, size_t out_bytes)
+{
+    struct gn_foreign_finds strangers;
+    for (int i = 0; i < t->bodies->n_bodies; i++)
+        if (t->tracked[i].is_misfit)
+            return explain_body(t, i, out, out_bytes);
+    if (!get_strangers(t, &strangers))
+        return false;
+    char ids[128] = "", name[2][32];
+    for (int i = 0, at = 0; i < strangers.n_ids; i++)
+        at += snprintf(ids + at, sizeof(ids) - (size_t)at, i ? ", %d" : "%d", strangers.ids[i]);
+    gn_marker_print_name(strangers.dictionary, name[0], sizeof(name[0]));
+    gn_marker_print_name(t->bodies->dictionary, name[1], sizeof(name[1]));
+    const char *missing = NULL;
+    for (int i = 0; i < t->bodies->n_bodies && !missing; i++)
+        missing = t->memory[i].was_ever_seen ? NULL : t->bodies->bodies[i].name;
+    if (strangers.dictionary == t->bodies->dictionary)
+        snprintf(out, out_bytes,
+                 "no marker of \"%s\" is seen, but of %s there are %s, which no body has", missing,
+                 name[0], ids);
+    else
+        snprintf(out, out_bytes, "no marker of %s is seen, but of %s there are %s", name[1],
+                 name[0], ids);
     return true;
 }
 

@@ -35,6 +35,8 @@ struct gn_tracker_options {
 /** One body in the last picture. */
 struct gn_tracked_body {
     bool is_seen;
+    bool is_misfit; // its markers are not where they are listed, on one another; if by more than a
+                    // tenth of their side, it is not seen
     struct gn_pose camera_from_body; // steady; as measured with is_raw
     struct gn_pose_fit fit;          // as measured
     int n_markers;                   // that it was measured by
@@ -45,6 +47,7 @@ struct gn_tracker_counts {
     uint64_t n_pictures;
     uint64_t n_seen; // body times picture
     struct gn_watch_counts markers;
+    uint64_t n_misfits;        // body times picture
     uint64_t n_flips_rejected; // see pose_choice.h
     uint64_t n_flips_corrected;
     uint64_t n_rest;         // steps from picture to picture at rest, over which:
@@ -81,6 +84,14 @@ bool gn_tracker_get_camera(const struct gn_tracker *tracker, int body,
 /** Where `body` was in the frame of `base`. False where either was not seen in the picture. */
 bool gn_tracker_get_between(const struct gn_tracker *tracker, int base, int body,
                             struct gn_pose *out_base_from_body);
+
+/**
+ * Whether the last picture speaks against the list of the bodies: markers are not where it has
+ * them; other ids, or another dictionary, where none of its own is seen.
+ */
+bool gn_tracker_is_doubtful(const struct gn_tracker *tracker);
+/** Writes what does, as a sentence; false where nothing does. Takes some milliseconds. */
+bool gn_tracker_explain(const struct gn_tracker *tracker, char *out, size_t out_bytes);
 
 void gn_tracker_get_counts(const struct gn_tracker *tracker, struct gn_tracker_counts *out);
 

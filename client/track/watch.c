@@ -12,7 +12,6 @@
 enum {
     /** Where some markers are missing, the whole picture is searched again after so many. */
     SEARCH_INTERVAL = 15,
-    MAX_STRANGERS = 16,
 };
 
 /** Between two looks for small markers while nothing is seen, ns. */
@@ -36,8 +35,8 @@ struct gn_watch {
     struct gn_marker_window window;
     int n_last;
     struct followed last[GN_SEARCH_MAX_FOUND], next[GN_SEARCH_MAX_FOUND];
-    int n_strangers;
-    int strangers[MAX_STRANGERS];
+    struct gn_foreign_finds strangers; // of the bodies' dictionary
+    struct gn_foreign *foreign;        // of others; NULL: not needed yet
     struct gn_watch_counts counts;
 };
 
@@ -59,6 +58,7 @@ int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodi
             .camera = camera, .dictionary = bodies->dictionary, .ids = ids, .n_ids = n};
         w->camera = camera;
         w->bodies = bodies;
+        w->strangers.dictionary = bodies->dictionary;
         w->since_whole = SEARCH_INTERVAL;
         err = gn_search_create(&wanted, &w->search, out_error);
     }
@@ -71,19 +71,27 @@ int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodi
 
 void gn_watch_destroy(struct gn_watch **watch)
 {
-    if (*watch)
+    if (*watch) {
         gn_search_destroy(&(*watch)->search);
+        gn_foreign_destroy(&(*watch)->foreign);
+    }
     free(*watch);
     *watch = NULL;
 }
 
 static void note_stranger(struct gn_watch *w, int id)
 {
-    for (int i = 0; i < w->n_strangers; i++)
-        if (w->strangers[i] == id)
+    struct gn_foreign_finds *f = &w->strangers;
+    for (int i = 0; i < f->n_ids; i++)
+        if (f->ids[i] == id)
             return;
-    if (w->n_strangers < MAX_STRANGERS)
-        w->strangers[w->n_strangers++] = id;
+    int at = f->n_ids;
+    if (at == GN_FOREIGN_MAX_IDS)
+        return;
+    for (; at > 0 && f->ids[at - 1] > id; at--)
+        f->ids[at] = f->ids[at - 1];
+    f->ids[at] = id;
+    f->n_ids++;
 }
 
 /** Keeps the sightings of the bodies' own markers; one that is seen twice tells nothing. */
@@ -111,8 +119,6 @@ static int search(struct gn_watch *w, const struct gn_grey *grey,
                   const struct gn_marker_window *window, struct gn_error *out_error)
 {
     int err = gn_search_find(w->search, grey, window, w->with_small, &w->finds, out_error);
-    if (!window)
-        w->n_strangers = 0;
     if (err)
         return err;
     w->counts.n_coarse_corners += (uint64_t)w->finds.n_coarse;
@@ -175,6 +181,7 @@ static int search_again(struct gn_watch *w, const struct gn_grey *grey, bool is_
     if (err || (is_near && w->finds.n_found >= w->n_last))
         return err;
     w->since_whole = 0;
+    w->strangers.n_ids = 0;
     w->counts.n_searched_whole++;
     return search(w, grey, NULL, out_error);
 }
@@ -199,6 +206,20 @@ static void remember(struct gn_watch *w)
         set_window(w);
 }
 
+/** Where nothing is seen: looks for markers of other dictionaries. */
+static int look_for_others(struct gn_watch *w, const struct gn_grey *grey,
+                           struct gn_error *out_error)
+{
+    int n;
+    double(*quads)[4][2] = gn_search_get_unread(w->search, &n);
+    if (n == 0 || w->strangers.n_ids > 0)
+        return 0;
+    if (!w->foreign && gn_foreign_create(&w->foreign) < 0)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    gn_foreign_look(w->foreign, grey, quads, n);
+    return 0;
+}
+
 int gn_watch_update(struct gn_watch *w, const struct gn_grey *grey, int64_t time_ns,
                     struct gn_error *out_error)
 {
@@ -210,9 +231,13 @@ int gn_watch_update(struct gn_watch *w, const struct gn_grey *grey, int64_t time
     } else {
         w->with_small = is_small_due(w, time_ns);
         err = search_again(w, grey, is_near, out_error);
+        if (!err && w->with_small && w->finds.n_found == 0)
+            err = look_for_others(w, grey, out_error);
     }
     if (err)
         w->finds.n_found = 0;
+    if (w->finds.n_found > 0)
+        gn_foreign_destroy(&w->foreign);
     remember(w);
     return err;
 }
@@ -223,11 +248,14 @@ const struct gn_marker_sighting *gn_watch_get_sightings(const struct gn_watch *w
     return w->finds.found;
 }
 
-int gn_watch_get_strangers(const struct gn_watch *w, int max, int *out_ids)
+const struct gn_foreign_finds *gn_watch_get_strangers(const struct gn_watch *w)
 {
-    int n = w->n_strangers < max ? w->n_strangers : max;
-    memcpy(out_ids, w->strangers, (size_t)n * sizeof(*out_ids));
-    return n;
+    return &w->strangers;
+}
+
+bool gn_watch_get_foreign(const struct gn_watch *w, struct gn_foreign_finds *out)
+{
+    return w->foreign && gn_foreign_get(w->foreign, out);
 }
 
 void gn_watch_get_counts(const struct gn_watch *w, struct gn_watch_counts *out)

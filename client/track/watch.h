@@ -8,6 +8,7 @@
 #define GN_CLIENT_TRACK_WATCH_H
 
 #include "client/track/bodies.h"
+#include "client/track/foreign.h"
 #include "client/track/search.h"
 
 /** What a watch has counted, in pictures, and markers. */
@@ -39,8 +40,10 @@ GN_MUST_USE int gn_watch_update(struct gn_watch *watch, const struct gn_grey *gr
  */
 const struct gn_marker_sighting *gn_watch_get_sightings(const struct gn_watch *watch, int *out_n);
 
-/** Ids that the last whole search saw and that are no body's, at most max; returns how many. */
-int gn_watch_get_strangers(const struct gn_watch *watch, int max, int *out_ids);
+/** Markers of the bodies' dictionary in the last searched picture that no body has. */
+const struct gn_foreign_finds *gn_watch_get_strangers(const struct gn_watch *watch);
+/** Markers of other dictionaries, where none of the bodies' is seen. False where there are none. */
+bool gn_watch_get_foreign(const struct gn_watch *watch, struct gn_foreign_finds *out);
 
 void gn_watch_get_counts(const struct gn_watch *watch, struct gn_watch_counts *out);
 

@@ -63,6 +63,8 @@ struct gn_marker_finder;
 
 /** The index of a dictionary's name, -1 where there is none such. */
 int gn_marker_find_dictionary(const char *name, size_t name_bytes);
+/** Writes the name of a dictionary; "" where there is none such. */
+void gn_marker_print_name(int dictionary, char *out, size_t out_bytes);
 /** The number of ids of a dictionary. 0: no such dictionary, or no OpenCV. */
 int gn_marker_count_ids(int dictionary);
 

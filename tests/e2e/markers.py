@@ -8,6 +8,7 @@ usage: markers.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON MARKER_SHOTS
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -195,6 +196,54 @@ def test_an_object_follows_its_markers():
             len(followed ^ true), len(before ^ true))
 
 
+def cube_markers(change):
+    """MARKERS with the cube's grid listed one by one, each with what change(i) says."""
+    return {**MARKERS, 'bodies': [MARKERS['bodies'][0], {'name': 'cube', 'markers': [
+        {'id': 20 + i, 'size': 0.045, 'position': [(i % 2 - .5) * .055, (.5 - i // 2) * .055, 0],
+         **change(i)} for i in range(4)]}]}
+
+
+def test_markers_that_are_not_as_listed_are_told():
+    upside_down = {'orientation': [0, 0, 0, 1]}
+    wrong = [
+        (cube_markers(lambda i: {}), None),
+        (cube_markers(lambda i: upside_down), r'"cube" \(seen: 20, 21, 22, 23\).* 180 degrees fits'),
+        (cube_markers(lambda i: upside_down if i == 2 else {}), 'marker 22 is turned by 180 deg'),
+        (cube_markers(lambda i: {'size': 0.06} if i == 1 else {}),
+         r'marker 21 is 4(4\.[5-9]|5\.[0-5]) mm wide, not 60\.0'),
+        (cube_markers(lambda i: {'position': [.0275, -.0475, 0]} if i == 3 else {}),
+         r'marker 23 lies (19\.[5-9]|20\.[0-5]) mm away'),
+        ({**MARKERS, 'bodies': [MARKERS['bodies'][0], {'name': 'cube', 'grids': [
+            {**MARKERS['bodies'][1]['grids'][0], 'gap': 0.02}]}]},
+         r'5(4\.[5-9]|5\.[0-5]) mm apart, not 65\.0'),
+        ({**MARKERS, 'bodies': [{'name': 'world', 'markers': [{'id': 9, 'size': 0.08}]},
+                                MARKERS['bodies'][1]]},
+         'no marker of "world" is seen, but of 4x4_50 there are 7,'),
+        ({**MARKERS, 'dictionary': '6x6_250'}, 'no marker of 6x6_250 is seen, but of 4x4_50 there '
+                                               'are 7, 20, 21, 22, 23'),
+    ]
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
+        for markers, words in wrong:
+            status, out, err = gnomon(
+                'track', server(daemon), '--object', 'cube', '--files', desk.at('shots'),
+                '--camera', desk.at('camera.json'), '--markers',
+                desk.write('wrong.json', json.dumps(markers)), '--rate', '50')
+            lines = [line for line in err.splitlines() if 'wrong.json' in line]
+            assert len(lines) == bool(words), (words, err)
+            assert not words or re.search(words, lines[0]), (words, lines)
+            assert words or (status == 0 and 'not where they are listed' not in out), out
+        give_light(daemon, desk)
+        # The viewer says it too, and puts nothing where it cannot know where that is.
+        upside = {**MARKERS, 'bodies': [{**wrong[1][0]['bodies'][1], 'name': 'world'}]}
+        status, out, err = gnomon(
+            'view', server(daemon), '--files', desk.at('shots'), '--camera',
+            desk.at('camera.json'), '--markers', desk.write('upside.json', json.dumps(upside)),
+            '--out', desk.at('out'))
+        assert status == 0 and err.count('\n') == 1 and '180 degrees fits' in err, err
+        assert '%d frames without the world' % SHOTS in out, out
+        assert '%d times they were not where they are listed' % (SHOTS - 1) in out, out
+
+
 def test_what_is_wrong_is_said():
     with Desk() as desk:
         files = ['--files', desk.at('shots'), '--camera', desk.at('camera.json')]
@@ -226,4 +275,5 @@ def test_what_is_wrong_is_said():
 
 
 run_tests([test_each_frame_has_the_pose_of_its_own_picture, test_a_short_text_and_steady_poses,
-           test_an_object_follows_its_markers, test_what_is_wrong_is_said])
+           test_an_object_follows_its_markers, test_markers_that_are_not_as_listed_are_told,
+           test_what_is_wrong_is_said])
