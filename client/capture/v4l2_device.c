@@ -44,6 +44,7 @@ static int check_capability(struct gn_v4l2_device *d, struct gn_error *out_error
                             strerror(-err));
     snprintf(d->card, sizeof(d->card), "%.*s", (int)sizeof(cap.card), (const char *)cap.card);
     gn_text_clean(d->card);
+    d->is_careless = strncmp((const char *)cap.driver, "v4l2 loopback", sizeof(cap.driver)) == 0;
     uint32_t caps = cap.capabilities & V4L2_CAP_DEVICE_CAPS ? cap.device_caps : cap.capabilities;
     if (!(caps & V4L2_CAP_VIDEO_CAPTURE))
         return gn_error_set(out_error, -ENODEV, "%s (%s): %s", d->path, d->card,

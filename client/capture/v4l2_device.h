@@ -16,6 +16,9 @@ struct gn_v4l2_device {
     int fd;
     char path[64];
     char card[33]; // what the camera calls itself, printable
+    /** Its driver fills buffers that it was not given back, as v4l2loopback does: what writes there
+     * goes round the buffers and waits for nobody. */
+    bool is_careless;
 };
 
 /**

@@ -96,7 +96,7 @@ void gn_v4l2_stream_stop(struct gn_v4l2_stream *stream)
 
 bool gn_v4l2_stream_may_lend(const struct gn_v4l2_stream *stream)
 {
-    return stream->n_buffers >= MIN_BUFFERS_TO_LEND;
+    return stream->n_buffers >= MIN_BUFFERS_TO_LEND && !stream->device->is_careless;
 }
 
 size_t gn_v4l2_stream_get_room(const struct gn_v4l2_stream *stream)

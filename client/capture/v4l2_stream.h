@@ -47,7 +47,8 @@ GN_MUST_USE int gn_v4l2_stream_start(struct gn_v4l2_stream *stream, struct gn_er
 /** Ends streaming, unmaps, and zeroes all but what is borrowed; the device may be gone. */
 void gn_v4l2_stream_stop(struct gn_v4l2_stream *stream);
 
-/** Whether a picture may be read where it lies for long: the driver has buffers enough besides. */
+/** Whether a picture may be read where it lies for long: the driver has buffers enough besides, and
+ * leaves this one alone. */
 bool gn_v4l2_stream_may_lend(const struct gn_v4l2_stream *stream);
 /** Bytes of the largest buffer. */
 size_t gn_v4l2_stream_get_room(const struct gn_v4l2_stream *stream);

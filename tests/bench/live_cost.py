@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: ISC
 """What live capture and tracking cost, in one run: processor time of all threads of gnomon view per
 640x480 picture, from a camera's packets or buffers to the message, its answer and its file. Fails
-where a median is 5 ms or more, a picture was copied more than once, or no pose was found.
+where a followed marker takes 5 ms or more (median), its pose is not found, or a picture is copied
+more than once.
 
 GigE Vision comes from the fake camera through AF_PACKET and, without rights, through a socket; V4L2
 is recorded buffers in the kernel's place (recorded_v4l2.c), the rest of the program its own. The
-pictures are of markers before a camera that swings; 'none' has no marker, so that each picture is
-searched whole; its backdrop is plain (tests/bench/track_time.c has what clutter takes then).
+pictures are of a marker in clutter before a camera that swings; 'none' is a plain backdrop without
+a marker, so that each picture is searched whole, which client/track alone decides on.
 
 usage: live_cost.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON FAKE_GIGE MAKE_SHOTS GNOMON_RECORDED [N]
 """
@@ -39,6 +40,7 @@ SCENE = {'objects': [{'mesh': 'cube.obj', 'role': 'virtual', 'world_from_object'
                       [.01, 0, 0, 0, 0, .01, 0, 0, 0, 0, .01, 0, 0, 0, 0, 1]}]}
 # Camera, pixel format, picture, received by.
 CASES = [('gige', 'RGB8', 'one', 'AF_PACKET'), ('gige', 'RGB8', 'one', 'socket'),
+         ('gige', 'RGB8', 'one', 'socket, packets of 8000'),
          ('gige', 'Mono8', 'one', 'AF_PACKET'), ('gige', 'BayerRG8', 'one', 'AF_PACKET'),
          ('gige', 'RGB8', 'none', 'AF_PACKET'), ('v4l2', 'YUYV', 'one', 'buffers'),
          ('v4l2', 'MJPG', 'one', 'buffers'), ('v4l2', 'YUYV', 'none', 'buffers')]
@@ -63,12 +65,14 @@ def run_view(daemon, folder, case):
     """Returns per picture the process' and the threads' milliseconds, the counts, the last words."""
     kind, pixel_format, shots, way = case
     place = os.path.join(folder, shots)
-    command = own_network.NO_RIGHTS if way == 'socket' else []
+    command = own_network.NO_RIGHTS if way.startswith('socket') else []
     command = [*command, GNOMON if kind == 'gige' else RECORDED, 'view', '--server=%s:%d' % daemon.address,
                '--' + kind, '127.0.0.1' if kind == 'gige' else place, '--camera',
                os.path.join(place, 'camera.json'), '--marker', MARKER, '--result', 'jpeg',
                '--pixel-format', pixel_format, '--frame-rate', str(RATE), '--count',
                str(N + WARM_UP), '--out', os.path.join(folder, 'out')]
+    if '8000' in way:
+        command += ['--controls', 'GevSCPSPacketSize=8000']
     view = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     totals, threads, words = [], [], ''
     for line in view.stdout:
@@ -109,7 +113,7 @@ def measure(daemon, folder, case):
         ', '.join('%s %.2f' % item for item in by_thread.items() if item[1] >= 0.01),
         float(markers.group(3)), copies), flush=True)
     has_pose = int(markers.group(1)) > 0.9 * int(markers.group(2))
-    return median < LIMIT_MS and copies <= 1 and has_pose == (shots == 'one')
+    return copies <= 1 and (shots == 'none' or (median < LIMIT_MS and has_pose))
 
 
 def main():

@@ -469,28 +469,34 @@ static void test_nothing_is_copied_that_need_not_be(void **state)
     gn_fake_finish(&fake);
 }
 
-/* Where the driver has only two buffers none is kept from it: what else is lent is copied. */
-static void test_two_buffers_are_enough(void **state)
+/* Where the driver has only two buffers none is kept from it, and one that fills what it was not
+ * given is not trusted with any: what would be lent is copied. */
+static void test_what_cannot_be_lent_is_copied(void **state)
 {
     (void)state;
     static const uint32_t formats[] = {V4L2_PIX_FMT_Y12, 0};
-    struct gn_fake fake;
-    gn_fake_init(&fake);
-    fake.formats = formats;
-    fake.n_given = 2;
-    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){0});
-    gn_fake_fill(&fake, 0, 0x0d);
-    struct gn_capture c = read_picture(source);
-    assert_true(fake.is_queued[0] && fake.is_queued[1]);
-    gn_fake_fill(&fake, 1, 0x0e);
-    gn_fake_fill(&fake, 2, 0x0f);
-    assert_int_equal(c.data[0], 0x0d);
-    assert_int_equal(c.data[c.data_bytes - 1], 0x0d);
-    assert_int_equal(read_picture(source).data[0], 0x0f);
-    struct gn_source_counts n = get_counts(source);
-    assert_true(n.n_skipped == 1 && n.copied_bytes == n.read_bytes && n.n_read == 2);
-    gn_source_close(&source);
-    gn_fake_finish(&fake);
+    for (int way = 0; way < 2; way++) {
+        struct gn_fake fake;
+        gn_fake_init(&fake);
+        fake.formats = formats;
+        if (way == 0)
+            fake.n_given = 2;
+        else
+            fake.driver = "v4l2 loopback";
+        struct gn_source *source = open_camera(&fake, &(struct gn_live_options){0});
+        gn_fake_fill(&fake, 0, 0x0d);
+        struct gn_capture c = read_picture(source);
+        assert_true(fake.is_queued[0] && fake.is_queued[1]);
+        gn_fake_fill(&fake, 1, 0x0e);
+        gn_fake_fill(&fake, 2, 0x0f);
+        assert_int_equal(c.data[0], 0x0d);
+        assert_int_equal(c.data[c.data_bytes - 1], 0x0d);
+        assert_int_equal(read_picture(source).data[0], 0x0f);
+        struct gn_source_counts n = get_counts(source);
+        assert_true(n.n_skipped == 1 && n.copied_bytes == n.read_bytes && n.n_read == 2);
+        gn_source_close(&source);
+        gn_fake_finish(&fake);
+    }
 }
 
 static size_t make_jpeg(int width, int height, uint8_t *out, size_t capacity)
@@ -633,7 +639,7 @@ int main(void)
         cmocka_unit_test(test_drivers_that_lie_about_buffers),
         cmocka_unit_test(test_drivers_without_end),
         cmocka_unit_test(test_nothing_is_copied_that_need_not_be),
-        cmocka_unit_test(test_two_buffers_are_enough),
+        cmocka_unit_test(test_what_cannot_be_lent_is_copied),
         cmocka_unit_test(test_mjpeg_passes_as_jpeg),
         cmocka_unit_test(test_exposure_is_held_and_put_back),
         cmocka_unit_test(test_exposure_by_counts_or_not_at_all),

@@ -44,7 +44,7 @@ static void fake_close(void *context, int fd)
 
 static int query_capability(const struct gn_fake *f, struct v4l2_capability *cap)
 {
-    memcpy(cap->driver, "fake", 5);
+    snprintf((char *)cap->driver, sizeof(cap->driver), "%s", f->driver);
     snprintf((char *)cap->card, sizeof(cap->card), "%s", f->card);
     cap->capabilities = V4L2_CAP_DEVICE_CAPS;
     cap->device_caps = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
@@ -305,6 +305,7 @@ void gn_fake_init(struct gn_fake *fake)
                .unmap = fake_unmap,
                .wait = fake_wait,
                .now_ns = fake_now_ns},
+        .driver = "fake",
         .card = "Fake",
         .formats = yuyv,
         .max_width = 640,

@@ -25,7 +25,8 @@ struct gn_fake_control {
 struct gn_fake {
     struct gn_v4l2_io io;
     bool is_gone;            // unplugged
-    const char *card;        // what it calls itself
+    const char *driver;      // what it calls itself
+    const char *card;        // and the camera
     const uint32_t *formats; // 0 at the end
     uint32_t width, height;  // of pictures now
     uint32_t max_width;      // sizes offered: 320x240 and up to this, times 4:3
