@@ -234,6 +234,8 @@ static int shoot_all(struct work *w, const struct plan *plan, const struct gn_ex
         printf("exposure %d of %d: ", i + 1, plan->n);
         fflush(stdout);
         err = shoot(w, plan->values[i], 0, &clipped, out_error);
+        if (err) // what stderr says begins on a line of its own
+            printf("\n");
     }
     return err;
 }

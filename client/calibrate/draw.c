@@ -71,12 +71,18 @@ struct range {
     double error;     // the axis runs from -error to error
 };
 
+/* Light that a code says to within 5 %: what the axes are made for. */
+static bool is_known(const struct gn_chart_point *p)
+{
+    return p->uncertainty < 0.05;
+}
+
 static struct range find_range(const struct gn_chart_response *r)
 {
     struct range range = {INFINITY, -INFINITY, 0.02};
     for (int i = 0; i < r->n_points; i++) {
         const struct gn_chart_point *p = &r->points[i];
-        if (p->is_clipped || !(p->light > 0) || !isfinite(p->error))
+        if (p->is_clipped || !(p->light > 0) || !isfinite(p->error) || !is_known(p))
             continue;
         range.low = fmin(range.low, floor(log10(p->light)));
         range.high = fmax(range.high, ceil(log10(p->light)));
@@ -125,14 +131,14 @@ static void print_frame(FILE *out, const struct range *range)
     }
     fprintf(out,
             "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">light, a perfect white in the first "
-            "picture = 1 (hollow: left out)</text>\n",
+            "picture = 1 (hollow: left out; pale: codes too coarse to say it to 5 %%)</text>\n",
             (LEFT + PLOT_W - RIGHT) / 2, PLOT_H - 12);
 }
 
 static void print_point(FILE *out, const struct range *range, const struct gn_chart_point *p)
 {
     static const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
-    if (!(p->light > 0) || !isfinite(p->error) || p->is_clipped)
+    if (!(p->light > 0) || !isfinite(p->error) || p->is_clipped || log10(p->light) < range->low)
         return;
     double rho[3];
     int code[3];
@@ -142,9 +148,10 @@ static void print_point(FILE *out, const struct range *range, const struct gn_ch
             p->patch >= GN_CHART_WHITE ? 0 : (int)(255 * gn_response_encode(&srgb, (float)rho[c]));
     char colour[16];
     snprintf(colour, sizeof(colour), "#%02x%02x%02x", code[0] & 255, code[1] & 255, code[2] & 255);
-    fprintf(out, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" stroke=\"%s\" fill=\"%s\"/>\n",
+    fprintf(out, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" stroke=\"%s\" fill=\"%s\"%s/>\n",
             get_x(range, log10(p->light)), get_y(range, p->error), colour,
-            p->is_outlier ? "none" : colour);
+            p->is_outlier ? "none" : colour,
+            is_known(p) ? "" : " fill-opacity=\"0.25\" stroke-opacity=\"0.25\"");
 }
 
 int gn_draw_chart_plot(const char *path, const struct gn_chart_response *response,

@@ -28,8 +28,8 @@ void gn_draw_box(struct gn_image8 *image, int x0, int y0, int x1, int y1, struct
 
 /**
  * The fit of a chart as an SVG file: relative error of each patch's light over that light on a
- * logarithmic axis, greys black, the rest in their colour, outliers and clipped ones hollow.
- * Returns 0, or a negative errno and a sentence.
+ * logarithmic axis, greys black, the rest in their colour, outliers hollow, pale what its code does
+ * not say to 5 %. Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_draw_chart_plot(const char *path, const struct gn_chart_response *response,
                                    struct gn_error *out_error);
