@@ -31,6 +31,14 @@ int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
     return 0;
 }
 
+const char *gn_cmd_find_misuse(const struct gn_options *options)
+{
+    if (!gn_options_is_set(options, NULL, NULL, "record") &&
+        !gn_options_is_default(options, NULL, NULL, "record-max"))
+        return "--record-max is for --record FILE";
+    return NULL;
+}
+
 int gn_cmd_fail(const struct gn_program *program, const char *sentence)
 {
     fprintf(stderr, "%s: %s\n", program->name, sentence);

@@ -64,6 +64,9 @@ int gn_cmd_doctor(int argc, char *const argv[]);
 int gn_cmd_load(const struct gn_program *program, int argc, char *const argv[],
                 struct gn_options **out_options);
 
+/** What is wrong with the options of GN_CMD_CONNECT_OPTIONS together; NULL: nothing. */
+const char *gn_cmd_find_misuse(const struct gn_options *options);
+
 /** "gnomon COMMAND: sentence" on stderr. Returns 1, the exit status. */
 int gn_cmd_fail(const struct gn_program *program, const char *sentence);
 

@@ -165,6 +165,9 @@ static int collect(struct run *run, const struct gn_options *options, struct gn_
 static const char *find_misuse(const struct gn_options *options)
 {
     const char *misuse = gn_calibrate_find_misuse(options);
+    if (!misuse && gn_options_is_set(options, NULL, NULL, "marker") &&
+        !gn_options_is_set(options, NULL, NULL, "charuco"))
+        misuse = "--marker is for --charuco DICTIONARY: a plain chessboard has no markers";
     if (!misuse && !gn_calibrate_is_live(options) &&
         (gn_options_is_set(options, NULL, NULL, "views") ||
          gn_options_is_set(options, NULL, NULL, "keep")))

@@ -97,6 +97,14 @@ static const char *find_misuse(const struct gn_options *options)
     bool is_fast = gn_options_get_bool(options, NULL, NULL, "as-fast-as-possible");
     bool is_open = gn_options_get_bool(options, NULL, NULL, "open-loop");
     bool is_looped = gn_options_get_bool(options, NULL, NULL, "loop");
+    const char *misuse = gn_cmd_find_misuse(options);
+    if (misuse)
+        return misuse;
+    if (gn_options_get_bool(options, NULL, NULL, "info") &&
+        (is_fast || is_open || is_looped || gn_options_is_set(options, NULL, NULL, "out") ||
+         gn_options_is_set(options, NULL, NULL, "record") ||
+         gn_options_get_bool(options, NULL, NULL, "expect-equal")))
+        return "--info replays nothing: leave out what is for a replay";
     if (is_fast && gn_options_is_set(options, NULL, NULL, "rate-factor") &&
         !gn_options_is_default(options, NULL, NULL, "rate-factor"))
         return "give --rate-factor or --as-fast-as-possible, one of them";

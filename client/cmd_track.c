@@ -189,6 +189,8 @@ static const char *find_misuse(const struct gn_options *options, const struct gn
     const char *name = gn_options_get_string(options, NULL, NULL, "object");
     if (!name[0] || strlen(name) >= sizeof(message->object))
         return "--object: names have 1 to 63 bytes";
+    if (gn_cmd_find_misuse(options))
+        return gn_cmd_find_misuse(options);
     if (gn_options_is_set(options, NULL, NULL, "marker") ||
         gn_options_is_set(options, NULL, NULL, "files") ||
         gn_options_is_set(options, NULL, NULL, "video") ||
@@ -199,6 +201,10 @@ static const char *find_misuse(const struct gn_options *options, const struct gn
     if (gn_options_is_set(options, NULL, NULL, "poses") ==
         gn_options_is_set(options, NULL, NULL, "orbit"))
         return "give one of --poses, --orbit, and --markers with a camera";
+    if (gn_options_is_set(options, NULL, NULL, "start-at") ||
+        gn_options_get_bool(options, NULL, NULL, "loop") ||
+        gn_options_get_double(options, NULL, NULL, "predict-ms") > 0)
+        return "--start-at, --loop and --predict-ms are for --markers";
     return NULL;
 }
 

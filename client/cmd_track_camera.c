@@ -33,6 +33,8 @@ static const char *find_misuse(const struct gn_options *options)
     const char *name = gn_options_get_string(options, NULL, NULL, "object");
     const char *misuse = gn_feed_find_misuse(options);
     if (!misuse)
+        misuse = gn_cmd_find_misuse(options);
+    if (!misuse)
         misuse = gn_poses_find_misuse(options);
     if (misuse)
         return misuse;

@@ -131,6 +131,9 @@ static const char *find_misuse(const struct gn_options *options)
         has_dir == has_camera)
         return "give --sequence DIR, or --files PATTERN, --video FILE or a camera (--gige ID, "
                "--v4l2 DEVICE) with --camera FILE";
+    if (gn_options_get_enum(options, NULL, NULL, "result") == 0 &&
+        !gn_options_is_default(options, NULL, NULL, "jpeg-quality"))
+        return "--jpeg-quality is for --result jpeg: PNG loses nothing";
     if (gn_options_get_double(options, NULL, NULL, "budget-ms") > 0 &&
         gn_options_get_enum(options, NULL, NULL, "quality") != 0)
         return "--budget-ms is for --quality interactive: the others' settings are not chosen";

@@ -209,7 +209,8 @@ int gn_feed_run(const struct gn_feed_command *command, struct gn_feed *r, int ar
         return go ? 2 : 0;
     gn_cmd_catch_signals();
     struct gn_error error = {0};
-    const char *misuse = command->find_misuse(options);
+    const char *misuse = gn_cmd_find_misuse(options);
+    misuse = misuse ? misuse : command->find_misuse(options);
     int status = 1;
     r->program = command->program;
     r->link = (struct gn_cmd_link){

@@ -9,7 +9,6 @@ import os
 import random
 import re
 import signal
-import subprocess
 import sys
 import time
 
@@ -17,7 +16,7 @@ sys.path.insert(0, sys.argv[2])
 from folder import Folder  # noqa: E402
 from gnomond import Daemon, run_tests  # noqa: E402
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
-from run import GNOMON, Run, server  # noqa: E402
+from run import Run, server  # noqa: E402
 
 WIDTH, HEIGHT = 64, 48
 # 2 m above the floor, looking down; the floor's 2 m fill the middle of the picture's 4 m.
@@ -392,43 +391,8 @@ def test_doctor():
         assert status == 1 and 'its first is demo' in out, out
 
 
-def test_usage():
-    """Wrong command lines: status 2, one line that says what is right."""
-    for arguments, words in (
-            (['probes'], ["did you mean 'probe'"]), (['fly'], ['--help lists them']),
-            (['probe'], ['--sequence DIR, --files PATTERN, --video FILE or a camera']),
-            (['probe', '--files', 'a', '--sequence', 'b'], ['one of them']),
-            (['probe', '--files', 'a', '--setup', 'b', '--projection', 'angular'], ['one of them']),
-            (['probe', '--files', 'a', '--rate', '0'], ['--rate', '0.001']),
-            (['probe', '--files', 'a', '--start-at', '1e12'], ['--start-at']),
-            (['probe', '--files', 'a', '--projection', 'square'], ['latlong, angular']),
-            (['probe', '--files', 'a', '--gige', 'any'], ['one of them']),
-            (['probe', '--gige', 'any', '--rate', '5'], ['--frame-rate']),
-            (['probe', '--gige', 'any', '--v4l2', 'any'], ['one camera']),
-            (['probe', '--files', 'a', '--controls', 'a=1'], ['for cameras']),
-            (['probe', '--files', 'a', '--v4l2', 'any'], ['one of them']),
-            (['probe', '--files', 'a', '--frame-size', '4x4'], ['for cameras']),
-            (['view', '--files', 'a', '--out', 'o'], ['--camera FILE']),
-            (['view', '--gige', 'any', '--out', 'o'], ['--camera FILE']),
-            (['view', '--sequence', 'a', '--camera', 'c', '--out', 'o'], ['--camera FILE']),
-            (['view', '--sequence', 'a'], ['--out']),
-            (['view', '--sequence', 'a', '--out', 'o', '--outstanding', '17'], ['[1, 16]']),
-            (['view', '--sequence', 'a', '--out', 'o', '--sync-lihgt', '1'], ['--sync-light']),
-            (['doctor', '--server', 'nowhere'], ['--server'])):
-        Run(*arguments).fail(2, *words)
-    Run('probe', '--files', sys.argv[0], '--server', '127.0.0.1:0').fail(1, '[1, 65535]')
-    for size in ('640', '640x', 'x480', '0x480', '640x480x3', '99999x480'):
-        Run('probe', '--gige', 'any', '--frame-size', size).fail(1, '--frame-size %s: ' % size,
-                                                                 '640x480')
-    status, _, err = Run().end()
-    assert status == 2 and 'usage: gnomon' in err
-    with open('/dev/full', 'w') as full:
-        done = subprocess.run([GNOMON, '--help'], stdout=full, stderr=subprocess.PIPE, timeout=60)
-    assert done.returncode == 1 and b'standard output' in done.stderr
-
-
 run_tests([test_frames, test_outstanding, test_probe_killed, test_daemon_killed,
            test_daemon_stopped, test_daemon_slow, test_jpeg, test_sync_light, test_several_views,
            test_no_light, test_late_start, test_interrupt, test_probe_files,
            test_probe_table_and_mask, test_view_files,
-           test_sequence, test_doctor, test_usage])
+           test_sequence, test_doctor])

@@ -8,13 +8,12 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree as xml
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import Daemon, light_up, probe, run_tests  # noqa: E402
 from pictures import png_bytes  # noqa: E402
 
@@ -23,17 +22,7 @@ SCALE = 3  # pixels of a millimetre
 SVG = '{http://www.w3.org/2000/svg}'
 
 
-class Folder:
-    def __enter__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-sheets-test.')
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
-
-    def at(self, name):
-        return os.path.join(self.path, name)
-
+class Paper(Folder):
     def run(self, *arguments, status=0):
         done = subprocess.run([GNOMON, *map(str, arguments)], cwd=self.path, timeout=100, text=True,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -71,8 +60,7 @@ class Folder:
                 x0, x1 = (math.ceil(c - .5) for c in (min(cuts), max(cuts)))
                 rows[row][x0:x1] = bytes(x1 - x0)
         pixels = b''.join(bytes(v for v in row for _ in range(3)) for row in rows)
-        with open(self.at(name), 'wb') as out:
-            out.write(png_bytes(width, height, pixels))
+        self.write(name, png_bytes(width, height, pixels))
         return width, height
 
 
@@ -82,7 +70,7 @@ def test_boards():
               (('--board', '8x6', '--charuco', '5x5_100', '--square', '0.03', '--marker', '0.022'),
                7 * 5, 240, 180))
     for words, n_corners, width, height in boards:
-        with Folder() as f:
+        with Paper() as f:
             if '--charuco' in words and not HAS_OPENCV:
                 assert 'OpenCV' in f.run('calibrate', 'print', *words, '--out', 'x.svg', status=1)
                 continue
@@ -127,7 +115,7 @@ def check_pose(body, size, x_mm, y_mm):
 
 def test_marker():
     """What gnomon view --marker finds is the marker printed from the same word, as far as it is large."""
-    with Folder() as f:
+    with Paper() as f:
         size, quads = f.print('--marker', 'apriltag_36h11:72:0.08')
         body = find_world(f, size, quads, '--marker', 'apriltag_36h11:72:0.08')
         check_pose(body, size, size[0] / 2, 80 / 6 + 40)
@@ -140,7 +128,7 @@ def test_body():
         {'name': 'world', 'markers': [{'id': 7, 'size': 0.05},
                                       {'id': 8, 'size': 0.04, 'position': [0.1, 0.06, 0], 'orientation': turned}]},
         {'name': 'box', 'markers': [{'id': 3, 'size': 0.05, 'position': [0, 0, 0.01]}]}]}
-    with Folder() as f:
+    with Paper() as f:
         with open(f.at('markers.json'), 'w') as out:
             json.dump(markers, out)
         size, quads = f.print('--markers', 'markers.json')
@@ -171,11 +159,11 @@ def test_refused():
             (('--board', '10x7', '--charuco', '4x4_50', '--marker', '4x4_50:7:0.05'), 1, 'in metres'),
             (('--board', '10x7', '--charuco', '4x4_50', '--marker', '0.5'), 1, 'do not lie in squares'),
             (('--markers', 'none.json'), 1, 'none.json')):
-        with Folder() as f:
+        with Paper() as f:
             err = f.run('calibrate', 'print', *words, '--out', 'x.svg', status=status)
             assert what in err and err.count('\n') == 1, err
             assert os.listdir(f.path) == []
-    with Folder() as f:
+    with Paper() as f:
         err = f.run('calibrate', 'print', '--board', '10x7', '--out', 'no/x.svg', status=1)
         assert 'no/x.svg' in err, err
         if HAS_OPENCV:
