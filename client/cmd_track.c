@@ -48,16 +48,15 @@ static const struct gn_option option_table[] = {
      .flag = "files",
      .type = GN_OPTION_STRING,
      .value_name = "PATTERN",
-     .help = "With --markers: a folder's pictures, or a pattern in quotes such as 'frames/*.png'."},
+     .help = "With markers: a folder's pictures, or a pattern in quotes such as 'frames/*.png'."},
     GN_FEED_VIDEO_OPTION,
     GN_LIVE_OPTIONS,
     {.key = "camera",
      .flag = "camera",
      .type = GN_OPTION_STRING,
      .value_name = "FILE",
-     .help =
-         "With --markers: camera.json with intrinsics (docs/frames.md), and where the camera is "
-         "if no marker of the world says that."},
+     .help = "With markers: camera.json with intrinsics (docs/frames.md), and where the camera is "
+             "if no marker of the world says that."},
     GN_POSES_OPTIONS,
     {.key = "predict-ms",
      .flag = "predict-ms",
@@ -66,7 +65,7 @@ static const struct gn_option option_table[] = {
      .max = 100,
      .default_value = "0",
      .value_name = "MS",
-     .help = "With --markers: send where the object will be so long after the picture, by constant "
+     .help = "With markers: send where the object will be so long after the picture, by constant "
              "speed: about the time until the poses are seen."},
     GN_FEED_PACE_OPTIONS("Without it a file of poses keeps its own times; an orbit goes at 60, "
                          "pictures at 10."),
@@ -82,7 +81,9 @@ static const struct gn_program program = {
              "  gnomon track --object teapot --orbit 0.2\n"
              "  gnomon track --object teapot --poses path.jsonl --rate 60\n"
              "  gnomon track --object teapot --markers markers.json --camera camera.json \\\n"
-             "      --gige any\n",
+             "      --gige any\n"
+             "  gnomon track --object cup --marker 4x4_50:7:0.03 --camera at-rest.json \\\n"
+             "      --v4l2 any\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
 };
@@ -191,20 +192,20 @@ static const char *find_misuse(const struct gn_options *options, const struct gn
         return "--object: names have 1 to 63 bytes";
     if (gn_cmd_find_misuse(options))
         return gn_cmd_find_misuse(options);
-    if (gn_options_is_set(options, NULL, NULL, "marker") ||
-        gn_options_is_set(options, NULL, NULL, "files") ||
+    if (gn_options_is_set(options, NULL, NULL, "files") ||
         gn_options_is_set(options, NULL, NULL, "video") ||
         gn_options_is_set(options, NULL, NULL, "camera") || gn_live_count_asked(options) > 0)
-        return "a camera's pictures are looked at for the markers of a file: give --markers FILE";
+        return "a camera's pictures are looked at for markers: give --markers FILE or --marker "
+               "DICT:ID:SIZE";
     if (gn_poses_find_misuse(options))
         return gn_poses_find_misuse(options);
     if (gn_options_is_set(options, NULL, NULL, "poses") ==
         gn_options_is_set(options, NULL, NULL, "orbit"))
-        return "give one of --poses, --orbit, and --markers with a camera";
+        return "give one of --poses, --orbit, and markers with a camera";
     if (gn_options_is_set(options, NULL, NULL, "start-at") ||
         gn_options_get_bool(options, NULL, NULL, "loop") ||
         gn_options_get_double(options, NULL, NULL, "predict-ms") > 0)
-        return "--start-at, --loop and --predict-ms are for --markers";
+        return "--start-at, --loop and --predict-ms are for --markers and --marker";
     return NULL;
 }
 
@@ -257,7 +258,7 @@ int gn_cmd_track(int argc, char *const argv[])
     int rc = gn_cmd_load(&program, argc, argv, &options);
     if (rc <= 0)
         return rc < 0 ? 2 : 0;
-    if (gn_options_is_set(options, NULL, NULL, "markers")) {
+    if (gn_poses_is_asked(options)) {
         gn_options_destroy(&options);
         return gn_cmd_track_camera(&program, argc, argv);
     }

@@ -8,7 +8,7 @@
 
 #include "client/cmd.h"
 
-/** With --markers. program: its options hold GN_FEED_PACE_OPTIONS, GN_LIVE_OPTIONS,
+/** With --markers or --marker. program: its options hold GN_FEED_PACE_OPTIONS, GN_LIVE_OPTIONS,
  * GN_POSES_OPTIONS, object, files, camera and predict-ms. Returns the exit status. */
 int gn_cmd_track_camera(const struct gn_program *program, int argc, char *const argv[]);
 

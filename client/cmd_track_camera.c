@@ -41,10 +41,9 @@ static const char *find_misuse(const struct gn_options *options)
     if (!name[0] || strlen(name) >= sizeof(((struct gn_msg_pose *)0)->object))
         return "--object: names have 1 to 63 bytes";
     if (n_recordings + gn_live_count_asked(options) != 1 ||
-        !gn_options_is_set(options, NULL, NULL, "camera") ||
-        !gn_options_is_set(options, NULL, NULL, "markers"))
-        return "to track by markers give --markers FILE, --camera FILE, and --files PATTERN, "
-               "--video FILE or a camera";
+        !gn_options_is_set(options, NULL, NULL, "camera") || !gn_poses_is_asked(options))
+        return "to track by markers give --markers FILE or --marker DICT:ID:SIZE, --camera FILE, "
+               "and --files PATTERN, --video FILE or a camera";
     if (!gn_options_get_bool(options, NULL, NULL, "steady") &&
         gn_options_get_double(options, NULL, NULL, "predict-ms") > 0)
         return "--predict-ms predicts from steady poses: leave out --no-steady";
@@ -82,19 +81,21 @@ static int open_all(struct gn_feed *feed, const struct gn_options *options,
     int err = gn_poses_read_camera(gn_options_get_string(options, NULL, NULL, "camera"), &t->camera,
                                    &has_place, out_error);
     if (!err)
-        err = gn_poses_open(options, &t->camera, true, &t->poses, out_error);
+        err = gn_poses_open(options, &t->camera, name, &t->poses, out_error);
     if (err)
         return err;
     t->body = gn_poses_find_body(t->poses, name);
     if (t->body < 0)
         return gn_error_set(out_error, -EINVAL, "%s: there is no body called \"%s\", the object",
                             gn_options_get_string(options, NULL, NULL, "markers"), name);
-    if (gn_poses_find_body(t->poses, GN_BODY_WORLD) < 0 && !has_place)
+    if (gn_poses_find_body(t->poses, GN_BODY_WORLD) < 0 && !has_place) {
+        const char *list = gn_options_get_string(options, NULL, NULL, "markers");
         return gn_error_set(out_error, -EINVAL,
                             "nothing says where the camera is: give a body \"" GN_BODY_WORLD
                             "\" in %s, or world_from_camera in %s",
-                            gn_options_get_string(options, NULL, NULL, "markers"),
+                            list ? list : "a file of --markers",
                             gn_options_get_string(options, NULL, NULL, "camera"));
+    }
     return open_source(t, options, out_error);
 }
 

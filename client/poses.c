@@ -79,8 +79,8 @@ int64_t gn_poses_get_time_ns(const struct gn_capture *capture)
     return capture->time_ns ? capture->time_ns : (int64_t)llround(capture->time_s * 1e9);
 }
 
-int gn_poses_open(const struct gn_options *options, const struct gn_camera *camera, bool is_raw,
-                  struct gn_poses **out_poses, struct gn_error *out_error)
+int gn_poses_open(const struct gn_options *options, const struct gn_camera *camera,
+                  const char *object, struct gn_poses **out_poses, struct gn_error *out_error)
 {
     *out_poses = NULL;
     if (!gn_vision_is_built())
@@ -94,11 +94,15 @@ int gn_poses_open(const struct gn_options *options, const struct gn_camera *came
     int err = path ? gn_bodies_read_file(path, &p->bodies, out_error)
                    : gn_bodies_read_text(gn_options_get_string(options, NULL, NULL, "marker"),
                                          &p->bodies, out_error);
+    if (!err && !path && object) {
+        struct gn_body *b = &p->bodies.bodies[0];
+        snprintf(b->name, sizeof(b->name), "%s", object);
+    }
     p->world = gn_bodies_find(&p->bodies, GN_BODY_WORLD);
     const struct gn_tracker_options wanted = {
         .camera = camera,
         .bodies = &p->bodies,
-        .is_raw = is_raw || !gn_options_get_bool(options, NULL, NULL, "steady")};
+        .is_raw = object || !gn_options_get_bool(options, NULL, NULL, "steady")};
     if (!err)
         err = gn_tracker_create(&wanted, &p->tracker, out_error);
     if (!err && p->dir && mkdir(p->dir, 0777) < 0 && errno != EEXIST)

@@ -29,8 +29,8 @@
          .flag = "marker",                                                                         \
          .type = GN_OPTION_STRING,                                                                 \
          .value_name = "DICT:ID:SIZE",                                                             \
-         .help = "Instead of --markers, of gnomon view: one marker, whose middle is the world's "  \
-                 "origin, such as 4x4_50:7:0.05 (its side in metres)."},                           \
+         .help = "Instead of --markers: one marker, its middle the world's origin; of gnomon "     \
+                 "track, the object's. Such as 4x4_50:7:0.05 (its side in metres)."},              \
         {.key = "steady",                                                                          \
          .flag = "steady",                                                                         \
          .type = GN_OPTION_BOOL,                                                                   \
@@ -58,11 +58,13 @@ GN_MUST_USE int gn_poses_read_camera(const char *path, struct gn_camera *out_cam
                                      bool *out_has_place, struct gn_error *out_error);
 
 /**
- * Opens what the options describe; camera is copied. is_raw: not made steady whatever the options
- * say. Returns 0, or a negative errno and a sentence: -ENOSYS where the build has no OpenCV.
+ * Opens what the options describe; camera is copied. object: --marker is on it, and poses are not
+ * made steady, whatever the options say; NULL: --marker is the world. Returns 0, or a negative
+ * errno and a sentence: -ENOSYS where the build has no OpenCV.
  */
 GN_MUST_USE int gn_poses_open(const struct gn_options *options, const struct gn_camera *camera,
-                              bool is_raw, struct gn_poses **out_poses, struct gn_error *out_error);
+                              const char *object, struct gn_poses **out_poses,
+                              struct gn_error *out_error);
 
 /** From now on each picture's poses are written to DIR/poses.jsonl, a line of JSON each
  * (docs/frames.md). Returns 0, or a negative errno and a sentence. */

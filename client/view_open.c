@@ -53,7 +53,7 @@ static int open_window(struct gn_viewer *v, const struct gn_options *options,
 static int open_poses(struct gn_viewer *v, const struct gn_options *options,
                       struct gn_error *out_error)
 {
-    int err = gn_poses_open(options, &v->camera, false, &v->poses, out_error);
+    int err = gn_poses_open(options, &v->camera, NULL, &v->poses, out_error);
     if (!err && gn_poses_find_body(v->poses, GN_BODY_WORLD) < 0)
         err = gn_error_set(out_error, -EINVAL,
                            "%s: there is no body called \"" GN_BODY_WORLD

@@ -3,7 +3,7 @@
 """gnomon view and track take poses from markers in the pictures: each frame goes with the pose of
 its own picture, one without markers comes back as it is.
 
-usage: markers.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON MARKER_SHOTS
+usage: markers.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON MARKER_SHOTS yes|no (built with libav)
 """
 import json
 import math
@@ -17,7 +17,7 @@ import time
 
 sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
-from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
+from pictures import exr_bytes, png_bytes, read_png, y4m_bytes  # noqa: E402
 
 GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
 SHOTS = 6  # picture 3 has no marker in it
@@ -113,6 +113,28 @@ def inverse(m):
     return [*r[0:3], t[0], *r[3:6], t[1], *r[6:9], t[2], 0, 0, 0, 1]
 
 
+def see_the_same_in_a_video(daemon, desk):
+    """All of it again from a video of the shots, whose codes are rounded twice."""
+    shots = [pixels(desk.at('shots/shot-%02d.png' % i)) for i in range(SHOTS)]
+    with open(desk.at('shots.y4m'), 'wb') as video:
+        video.write(y4m_bytes(CAMERA['width'], CAMERA['height'], 10, shots))
+    out = succeed('view', server(daemon), '--video', desk.at('shots.y4m'), '--camera',
+                  desk.at('camera.json'), '--markers', desk.at('markers.json'), '--no-steady',
+                  '--out', desk.at('from-video'))
+    assert '%d results' % SHOTS in out and '1 frames without' in out, out
+    poses = [read_poses(desk.at(where + '/poses.jsonl')) for where in ('out', 'from-video')]
+    for i, (still, moving) in enumerate(zip(*poses, strict=True)):
+        assert moving['time_ns'] == 100000000 * i, moving
+        for a, b in zip(still['bodies'], moving['bodies'], strict=True):
+            off = far(a['camera_from_body'], b['camera_from_body'])
+            assert a['name'] == b['name'] and off[0] < 0.001 and off[1] < 0.003, (a, b)
+        if still['bodies']:
+            name = sorted(n for n in os.listdir(desk.at('from-video')) if n.endswith('.png'))[i]
+            share = differing(pixels(desk.at('out/shot-%02d.png' % i)),
+                              pixels(desk.at('from-video/' + name)), 24)
+            assert share < 0.01, 'picture %d: %.4f of the pixels differ' % (i, share)
+
+
 def test_each_frame_has_the_pose_of_its_own_picture():
     with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
         give_light(daemon, desk)
@@ -130,6 +152,8 @@ def test_each_frame_has_the_pose_of_its_own_picture():
                 off = far(inverse(bodies['world']['camera_from_body']), truth['world_from_camera'])
                 assert off[0] < 0.003 and off[1] < 0.006, (line, truth)
                 assert bodies['world']['error_mm'] < 1, line
+        if sys.argv[5] == 'yes':
+            see_the_same_in_a_video(daemon, desk)
         assert sorted(os.listdir(desk.at('seen'))) == ['shot-%02d.png' % i for i in range(SHOTS)]
         # And the composites are those of the true poses.
         frames = [{'time_s': .1 * i, 'picture': 'shots/shot-%02d.png' % i,
@@ -194,6 +218,20 @@ def test_an_object_follows_its_markers():
         assert len(before ^ true) > 8, 'the object has not moved'
         assert len(followed ^ true) <= max(2, len(before ^ true) // 10), (
             len(followed ^ true), len(before ^ true))
+        # One marker on the object, its middle the object's origin, before a camera at rest.
+        rest = {**CAMERA, 'world_from_camera': desk.truth[0]['world_from_camera']}
+        out = succeed('track', server(daemon), '--object', 'cube', '--files',
+                      desk.at('shots/shot-00.png'), '--camera',
+                      desk.write('rest.json', json.dumps(rest)), '--marker', '4x4_50:7:0.08')
+        assert '1 poses sent of 1 pictures' in out, out
+        lying = look()
+        hand.send(POSE, pb.Pose(object='cube', world_from_object=pb.Transform(
+            orientation=[1, 0, 0, 0], position_m=[0, 0, 0]), time_ns=time.monotonic_ns()))
+        while json.loads(daemon.get('/api/v1/status')[1])['rooms'][0]['poses_in'] < SHOTS + 2:
+            assert time.monotonic() < deadline
+            time.sleep(.02)
+        true = look()
+        assert len(lying ^ followed) > 8 and len(lying ^ true) <= 2, len(lying ^ true)
 
 
 def cube_markers(change):
@@ -260,7 +298,8 @@ def test_what_is_wrong_is_said():
         refuse(2, ['--markers'], *track)
         refuse(1, ['"cup"', 'markers.json'], *track, '--markers', desk.at('markers.json'))
         refuse(2, ['--no-steady'], *track, '--markers', path, '--predict-ms', '20', '--no-steady')
-        refuse(1, ['world_from_camera'], 'track', *files, '--object', 'a', '--markers', path)
+        for by in (['--markers', path], ['--marker', '4x4_50:7:0.05']):
+            refuse(1, ['world_from_camera'], 'track', *files, '--object', 'a', *by)
         camera = json.load(open(desk.at('camera.json')))
         camera['response'] = {'type': 'table', 'table': [0, 1]}
         refuse(1, ['table.json', '--as gamma'], 'view', '--files', desk.at('shots'), '--camera',

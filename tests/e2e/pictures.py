@@ -74,3 +74,16 @@ def exr_bytes(width, height, rgb):
     first, block = len(head) + 8 * height, 8 + len(row)
     offsets = b''.join(struct.pack('<Q', first + y * block) for y in range(height))
     return head + offsets + b''.join(struct.pack('<iI', y, len(row)) + row for y in range(height))
+
+
+def y4m_bytes(width, height, rate, pictures):
+    """YUV4MPEG2, 4:4:4, full range, of pictures as R, G, B bytes: codes by BT.601 (JFIF 1.02)."""
+    data = b'YUV4MPEG2 W%d H%d F%d:1 Ip A1:1 C444 XCOLORRANGE=FULL\n' % (width, height, rate)
+    for rgb in pictures:
+        planes = [bytearray(), bytearray(), bytearray()]
+        for r, g, b in zip(rgb[0::3], rgb[1::3], rgb[2::3]):
+            y = .299 * r + .587 * g + .114 * b
+            for plane, code in zip(planes, (y, (b - y) / 1.772 + 128, (r - y) / 1.402 + 128)):
+                plane.append(min(round(code), 255))
+        data += b'FRAME\n' + b''.join(planes)
+    return data

@@ -14,7 +14,7 @@ import time
 sys.path.insert(0, sys.argv[2])
 from folder import Folder  # noqa: E402
 from gnomond import *  # noqa: E402,F403
-from pictures import exr_bytes, read_png  # noqa: E402
+from pictures import exr_bytes, read_png, y4m_bytes  # noqa: E402
 
 GNOMON = sys.argv[3]
 WIDTH, HEIGHT, N = 64, 48, 5
@@ -25,13 +25,8 @@ COLOURS = [(200, 60, 60), (60, 200, 60), (60, 60, 200), (128, 128, 128), (220, 2
 
 
 def y4m(rate):
-    """YUV4MPEG2, 4:4:4, full range: codes by BT.601 (JFIF 1.02), one colour a picture."""
-    data = b'YUV4MPEG2 W%d H%d F%d:1 Ip A1:1 C444 XCOLORRANGE=FULL\n' % (WIDTH, HEIGHT, rate)
-    for r, g, b in COLOURS:
-        y = .299 * r + .587 * g + .114 * b
-        codes = (y, (b - y) / 1.772 + 128, (r - y) / 1.402 + 128)
-        data += b'FRAME\n' + b''.join(bytes([round(c)]) * (WIDTH * HEIGHT) for c in codes)
-    return data
+    """One colour a picture."""
+    return y4m_bytes(WIDTH, HEIGHT, rate, [bytes(colour) * (WIDTH * HEIGHT) for colour in COLOURS])
 
 
 class Given(Folder):
