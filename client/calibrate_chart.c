@@ -11,9 +11,10 @@
 #include "client/calibrate/chart_find.h"
 #include "client/calibrate/chart_response.h"
 #include "client/calibrate/device_file.h"
-#include "client/calibrate/draw.h"
+#include "client/calibrate/plot.h"
 #include "client/calibrate_response.h"
 #include "client/vision/boards.h"
+#include "common/draw.h"
 #include "common/png.h"
 
 /* Codes nearer to the ends than this share of full scale count as clipped. */
@@ -258,7 +259,7 @@ static int draw_place(const struct run *run, const char *path, struct gn_error *
 static int write_results(const struct run *run, const struct gn_chart_response *r,
                          struct gn_error *out_error)
 {
-    int err = get(run, "plot") ? gn_draw_chart_plot(get(run, "plot"), r, out_error) : 0;
+    int err = get(run, "plot") ? gn_plot_chart(get(run, "plot"), r, out_error) : 0;
     if (err)
         return err;
     json_t *found = json_pack("{s:o}", "response", gn_device_file_make_curve(&r->curve));

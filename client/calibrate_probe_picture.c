@@ -2,9 +2,9 @@
 /* SPDX-License-Identifier: ISC */
 #include <math.h>
 
-#include "client/calibrate/draw.h"
 #include "client/calibrate_input.h"
 #include "client/calibrate_probe.h"
+#include "common/draw.h"
 #include "common/png.h"
 
 static const struct gn_ink green = {0, 220, 0}, red = {255, 40, 0}, blue = {60, 140, 255},

@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#include "client/calibrate/draw.h"
 #include "client/calibrate/solve.h"
+#include "common/draw.h"
 
 int gn_board_check(const struct gn_board *board, struct gn_error *out_error)
 {

@@ -13,6 +13,7 @@
 #include "client/track/grey.h"
 #include "client/track/misfit.h"
 #include "client/track/pose_choice.h"
+#include "common/draw.h"
 #include "common/jpeg.h"
 
 /** Below these speeds of its answer a body counts as at rest, m/s and rad/s. */
@@ -361,7 +362,7 @@ static double get_reach(const struct gn_body *body)
 
 int gn_tracker_draw(const struct gn_tracker *t, struct gn_image8 *out_rgb)
 {
-    static const uint8_t outline[3] = {255, 200, 0};
+    static const struct gn_ink outline = {255, 200, 0};
     if (!t->has_picture)
         return -EINVAL;
     int err = gn_image8_init(out_rgb, t->grey.width, t->grey.height, 3);
@@ -374,7 +375,7 @@ int gn_tracker_draw(const struct gn_tracker *t, struct gn_image8 *out_rgb)
     const struct gn_marker_sighting *seen = gn_watch_get_sightings(t->watch, &n_seen);
     for (int i = 0; i < n_seen; i++)
         for (int k = 0; k < 4; k++)
-            gn_axes_draw_line(out_rgb, seen[i].corners[k], seen[i].corners[(k + 1) % 4], outline);
+            gn_draw_line(out_rgb, seen[i].corners[k], seen[i].corners[(k + 1) % 4], outline);
     for (int i = 0; i < t->bodies->n_bodies; i++)
         if (t->tracked[i].is_seen)
             gn_axes_draw(out_rgb, &t->camera, &t->tracked[i].camera_from_body,
