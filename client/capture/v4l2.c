@@ -35,6 +35,7 @@ struct v4l2_source {
     struct gn_v4l2_exposure exposure;
     bool has_picture;     // one has come since this opening
     int64_t last_ns;      // when, or of the opening
+    int64_t given_ns;     // the last picture's time
     int64_t retry_ns;     // when a lost camera is looked for next
     struct gn_error news; // to be told
     struct gn_error said; // the last reason why it does not come back
@@ -127,8 +128,8 @@ static int64_t move_to_middle(const struct v4l2_source *s, const struct v4l2_buf
     return is_start ? t + half_ns : t - half_ns;
 }
 
-/** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC, never later
- * than now. */
+/** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC, neither before
+ * the picture that was given last nor later than now. */
 static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
 {
     int64_t now = now_ns(s), sec = b->timestamp.tv_sec, usec = b->timestamp.tv_usec;
@@ -136,13 +137,14 @@ static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
         (b->flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
     if (is_monotonic && sec >= 0 && sec < INT64_MAX / GN_NS_PER_S && usec >= 0 && usec < 1000000) {
         int64_t t = sec * GN_NS_PER_S + usec * GN_NS_PER_US;
-        if (t >= now - MAX_AGE_NS && t <= now + MAX_AHEAD_NS)
-            return move_to_middle(s, b, t < now ? t : now);
+        int64_t middle = move_to_middle(s, b, t < now ? t : now);
+        if (t >= now - MAX_AGE_NS && t <= now + MAX_AHEAD_NS && middle >= s->given_ns)
+            return middle;
     }
     if (!s->has_told_time)
         gn_error_set(&s->news, 0,
-                     "%s (%s): the driver gives no time of the monotonic clock; a picture's time "
-                     "is when it is read",
+                     "%s (%s): the driver gives no time of the monotonic clock, or one that goes "
+                     "back; such a picture's time is when it is read",
                      s->device.path, s->device.card);
     s->has_told_time = true;
     return now;
@@ -176,6 +178,7 @@ static void give(struct v4l2_source *s, const struct gn_v4l2_picture *p, struct 
         .data = data,
         .data_bytes = n_bytes,
     };
+    s->given_ns = out->time_ns;
     s->has_picture = true;
     s->last_ns = now_ns(s);
 }

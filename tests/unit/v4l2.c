@@ -184,6 +184,31 @@ static void test_times_are_never_ahead(void **state)
     gn_fake_finish(&fake);
 }
 
+/* Some go back, as uvcvideo's do where a camera's clock is corrected. */
+static void test_times_never_go_back(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    struct gn_source *source = open_camera(&fake, NULL);
+    const int64_t frame_ns = 40 * GN_NS_PER_MS;
+    int64_t last_ns = 0;
+    for (uint32_t i = 0; i < 30; i++) {
+        fake.now_ns += frame_ns;
+        struct v4l2_buffer *b = gn_fake_fill(&fake, i, 128);
+        int64_t late_ns = i < 10 ? 0 : 5 * frame_ns; // from the tenth on it is behind
+        b->timestamp.tv_sec = (fake.now_ns - late_ns) / GN_NS_PER_S;
+        b->timestamp.tv_usec = (fake.now_ns - late_ns) % GN_NS_PER_S / 1000;
+        int64_t got_ns = read_picture(source).time_ns;
+        assert_true(got_ns > last_ns && got_ns <= fake.now_ns);
+        last_ns = got_ns;
+        if (i == 10)
+            expect_news(source, "or one that goes back");
+    }
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 static void test_times_that_are_none(void **state)
 {
     (void)state;
@@ -630,6 +655,7 @@ int main(void)
         cmocka_unit_test(test_bad_buffers_are_counted_and_not_given),
         cmocka_unit_test(test_times_are_the_middle_of_the_exposure),
         cmocka_unit_test(test_times_are_never_ahead),
+        cmocka_unit_test(test_times_never_go_back),
         cmocka_unit_test(test_times_that_are_none),
         cmocka_unit_test(test_unplugged_and_plugged_in_again),
         cmocka_unit_test(test_what_comes_back_gives_the_same_pictures),
