@@ -130,6 +130,27 @@ static bool has(const struct gn_options *options, const char *key)
     return gn_options_is_set(options, NULL, NULL, key);
 }
 
+static bool is_stack(const struct gn_options *options)
+{
+    return has(options, "stack") || (gn_live_count_asked(options) > 0 &&
+                                     gn_options_get_enum(options, NULL, NULL, "live") == 1);
+}
+
+/* An option that would be ignored; NULL: none. */
+static const char *find_ignored(const struct gn_options *options)
+{
+    static const char *const chart[] = {"corners", "full-scale", "bits", "bayer",
+                                        "model",   "matrix",     "plot", "picture"};
+    static const char *const stack[] = {"method", "as", "radiance"};
+    for (size_t i = 0; is_stack(options) && i < GN_ARRAY_LEN(chart); i++)
+        if (!gn_options_is_default(options, NULL, NULL, chart[i]))
+            return chart[i];
+    for (size_t i = 0; !is_stack(options) && i < GN_ARRAY_LEN(stack); i++)
+        if (!gn_options_is_default(options, NULL, NULL, stack[i]))
+            return stack[i];
+    return NULL;
+}
+
 /* What is wrong with the options together; NULL: nothing. */
 static const char *find_misuse(const struct gn_options *options)
 {
@@ -159,25 +180,28 @@ static int calibrate(const struct gn_options *options, struct gn_calibrate_serie
     if (misuse)
         return gn_error_set(out_error, -EINVAL, "%s", misuse);
     bool is_live = gn_live_count_asked(options) > 0;
-    bool is_stack =
-        is_live ? gn_options_get_enum(options, NULL, NULL, "live") == 1 : has(options, "stack");
+    bool has_stack = is_stack(options);
+    const char *ignored = find_ignored(options);
+    if (ignored)
+        return gn_error_set(out_error, -EINVAL, "--%s is for %s", ignored,
+                            has_stack ? "charts, not for a stack" : "stacks, not for a chart");
     int err;
     series->format = (struct gn_calibrate_format){
         .full_scale16 = gn_options_get_int(options, NULL, NULL, "full-scale"),
         .bayer = gn_options_get_string(options, NULL, NULL, "bayer")};
     if (is_live)
-        err = gn_calibrate_series_take(series, &program, options, is_stack, out_error);
+        err = gn_calibrate_series_take(series, &program, options, has_stack, out_error);
     else
         err = gn_calibrate_series_list(
-            series, gn_options_get_string(options, NULL, NULL, is_stack ? "stack" : "chart"),
-            is_stack ? GN_STACK_MAX_PICTURES : GN_CHART_MAX_SHOTS,
+            series, gn_options_get_string(options, NULL, NULL, has_stack ? "stack" : "chart"),
+            has_stack ? GN_STACK_MAX_PICTURES : GN_CHART_MAX_SHOTS,
             gn_options_get_string(options, NULL, NULL, "times"), out_error);
     if (err)
         return err;
     if (has(options, "bits"))
         series->bits = (int)gn_options_get_int(options, NULL, NULL, "bits");
-    return is_stack ? gn_calibrate_stack(options, series, out_error)
-                    : gn_calibrate_chart(options, series, out_error);
+    return has_stack ? gn_calibrate_stack(options, series, out_error)
+                     : gn_calibrate_chart(options, series, out_error);
 }
 
 int gn_cmd_calibrate_response(int argc, char *const argv[])

@@ -173,6 +173,10 @@ def check_stack():
         assert float(re.search(r'off the table by ([\d.]+) %', out).group(1)) < 2, out
         assert json.load(open(f.at('probe.json')))['response'] == {'type': 'srgb'}
         refuse('needs --times', 'response', '--stack', f.at('s*.png'), '--out', f.at('x.json'))
+        for option, words in ((['--plot', 'x'], '--plot is for charts'), (['--model', 'linear'], '--model is for charts')):
+            refuse(words, 'response', '--stack', f.at('s*.png'), '--times', f.at('times.txt'), *option, '--out',
+                   f.at('x.json'))
+        refuse('--as is for stacks', 'response', '--chart', f.at('s*.png'), '--as', 'srgb', '--out', f.at('x.json'))
         refuse('codes fall', 'response', '--stack', f.at('s*.png'), '--times',
                ','.join(map(str, times[::-1])), '--out', f.at('x.json'))
 
