@@ -227,7 +227,20 @@ static int find_node(const struct regions *r, const struct grid *g, double u, do
     return found;
 }
 
-/* Grows the grid that three regions begin until it has no more. */
+/* Whether a node is there in the same row or column, `reach` steps away at most. */
+static bool has_neighbour(const struct grid *g, int u, int v, int reach)
+{
+    for (int i = -reach; i <= reach; i++) {
+        if (u + i >= 0 && u + i < SPAN && g->node[v][u + i] >= 0)
+            return true;
+        if (v + i >= 0 && v + i < SPAN && g->node[v + i][u] >= 0)
+            return true;
+    }
+    return false;
+}
+
+/* Grows the grid that three regions begin until it has no more: by neighbours, and
+ * over one that is not seen where there are none. */
 static void grow(const struct regions *r, int origin, int right, int below, struct grid *g)
 {
     memset(g->node, -1, sizeof(g->node));
@@ -235,26 +248,20 @@ static void grow(const struct regions *r, int origin, int right, int below, stru
     g->node[REACH][REACH + 1] = right;
     g->node[REACH + 1][REACH] = below;
     g->n = 3;
-    for (int round = 0; round < SPAN; round++) {
+    for (int reach = 1; reach <= 2;) {
         int before = g->n;
         if (fit_grid(r, g) < 0)
             return;
         for (int v = 0; v < SPAN; v++)
             for (int u = 0; u < SPAN; u++) {
-                // Neighbours of what is there: further off the grid is not known well enough.
-                bool is_next = (u > 0 && g->node[v][u - 1] >= 0) ||
-                               (v > 0 && g->node[v - 1][u] >= 0) ||
-                               (u < SPAN - 1 && g->node[v][u + 1] >= 0) ||
-                               (v < SPAN - 1 && g->node[v + 1][u] >= 0) ||
-                               (round > 2 && u > 1 && g->node[v][u - 2] >= 0) ||
-                               (round > 2 && u < SPAN - 2 && g->node[v][u + 2] >= 0);
-                if (g->node[v][u] >= 0 || !is_next)
+                if (g->node[v][u] >= 0 || !has_neighbour(g, u, v, reach))
                     continue;
                 g->node[v][u] = find_node(r, g, u - REACH, v - REACH, r->list[origin].area);
                 g->n += g->node[v][u] >= 0;
             }
-        if (g->n == before || g->n < 5) // chance ends here
+        if (g->n < 5) // chance ends here
             return;
+        reach = g->n > before ? 1 : reach + 1;
     }
 }
 
