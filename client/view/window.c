@@ -18,7 +18,7 @@ struct gn_window {
     int canvas_width, canvas_height;
     bool is_shown;   // asked to be
     bool is_hidden;  // nobody can see it
-    SDL_Rect before; // full screen: where it was
+    SDL_Rect before; // full screen that nobody else manages: where it was; w 0: managed
 };
 
 static int fail(int err, const char *what, struct gn_error *out_error)
@@ -137,6 +137,14 @@ void gn_window_set_title(struct gn_window *window, const char *title)
     SDL_SetWindowTitle(window->window, title);
 }
 
+/** Whether a window manager has put a frame round it. */
+static bool has_frame(const struct gn_window *w)
+{
+    int top = 0, left = 0, bottom = 0, right = 0;
+    return SDL_GetWindowBordersSize(w->window, &top, &left, &bottom, &right) == 0 &&
+           (top > 0 || left > 0 || bottom > 0 || right > 0);
+}
+
 /**
  * The window manager makes it fill the screen. Where there is none (a kiosk, a bare X server)
  * nobody does, though SDL 2.26 takes it for done and draws a picture larger than its window: so it
@@ -145,22 +153,24 @@ void gn_window_set_title(struct gn_window *window, const char *title)
 void gn_window_toggle_full_screen(struct gn_window *window)
 {
     struct gn_window *w = window;
-    bool is_full = SDL_GetWindowFlags(w->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
-    bool is_x11 = strcmp(SDL_GetCurrentVideoDriver(), "x11") == 0;
-    SDL_Rect screen;
-    if (!is_full) {
-        SDL_GetWindowPosition(w->window, &w->before.x, &w->before.y);
-        SDL_GetWindowSize(w->window, &w->before.w, &w->before.h);
-        if (is_x11 && SDL_GetDisplayBounds(SDL_GetWindowDisplayIndex(w->window), &screen) == 0) {
-            SDL_SetWindowPosition(w->window, screen.x, screen.y);
-            SDL_SetWindowSize(w->window, screen.w, screen.h);
+    SDL_Rect screen, *before = &w->before;
+    if (SDL_GetWindowFlags(w->window) & SDL_WINDOW_FULLSCREEN_DESKTOP) {
+        SDL_SetWindowFullscreen(w->window, 0);
+        if (before->w > 0) {
+            SDL_SetWindowSize(w->window, before->w, before->h);
+            SDL_SetWindowPosition(w->window, before->x, before->y);
         }
+        return;
     }
-    SDL_SetWindowFullscreen(w->window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
-    if (is_full && is_x11) {
-        SDL_SetWindowSize(w->window, w->before.w, w->before.h);
-        SDL_SetWindowPosition(w->window, w->before.x, w->before.y);
+    *before = (SDL_Rect){0};
+    if (strcmp(SDL_GetCurrentVideoDriver(), "x11") == 0 && !has_frame(w) &&
+        SDL_GetDisplayBounds(SDL_GetWindowDisplayIndex(w->window), &screen) == 0) {
+        SDL_GetWindowPosition(w->window, &before->x, &before->y);
+        SDL_GetWindowSize(w->window, &before->w, &before->h);
+        SDL_SetWindowPosition(w->window, screen.x, screen.y);
+        SDL_SetWindowSize(w->window, screen.w, screen.h);
     }
+    SDL_SetWindowFullscreen(w->window, SDL_WINDOW_FULLSCREEN_DESKTOP);
 }
 
 /** Textures do not outlive the device that they are on; the next present makes them again. */
