@@ -9,7 +9,6 @@ run by one of its own tests.
 """
 import json
 import os
-import re
 import shutil
 import signal
 import socket
@@ -18,32 +17,7 @@ import sys
 import tempfile
 
 import sequences
-
-
-def get_blocks(root):
-    with open(os.path.join(root, "README.md"), encoding="utf-8") as f:
-        return [b.strip() for b in re.findall(r"^```sh\n(.*?)^```", f.read(), re.S | re.M)]
-
-
-def run(block, folder, env):
-    """Runs the block in a session of its own, and ends what it left in the background."""
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        shell = subprocess.Popen(["sh", "-e", "-c", block], cwd=folder, env=env, stdout=log,
-                                 stderr=subprocess.STDOUT, start_new_session=True)
-        try:
-            status = shell.wait()
-        finally:
-            try:
-                os.killpg(shell.pid, signal.SIGTERM)
-            except ProcessLookupError:
-                pass
-        log.seek(0)
-        text = log.read()
-    for line in text.splitlines():
-        print("# " + line)
-    if status:
-        raise RuntimeError(f"exit status {status}")
-    return text
+import shell
 
 
 def prepare(rig, folder):
@@ -113,7 +87,8 @@ def main():
     path = ":".join(os.path.join(build, d) for d in ("server", "client"))
     env = dict(os.environ, PATH=path + ":" + os.environ["PATH"], GN_RIG_FOLDER=work,
                GN_RIG_OPTIONS=" ".join(sequences.OPTIONS))
-    blocks = [b for b in get_blocks(root) if b != "tests/run"]
+    with open(os.path.join(root, "README.md"), encoding="utf-8") as f:
+        blocks = [b for b in shell.get_blocks(f.read()) if b != "tests/run"]
     assert "deploy/quickstart" in blocks and len(blocks) >= 3, blocks
     print(f"1..{len(blocks)}")
     with tempfile.TemporaryDirectory(prefix="gnomon-readme-") as folder:
@@ -126,7 +101,7 @@ def main():
                 print(f"ok {n} - {name} # SKIP the default ports 7340 and 7341 are taken")
                 continue
             try:
-                text = run(block, root if block.startswith("deploy/") else folder, env)
+                text = shell.run(block, root if block.startswith("deploy/") else folder, env)
                 if block.startswith("deploy/"):
                     check_quickstart(root, text)
                 elif "gnomon view" in block:

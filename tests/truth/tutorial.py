@@ -25,6 +25,7 @@ ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), '..'))
 sys.path[:0] = [ROOT, os.path.join(ROOT, 'e2e')]
 import own_network  # noqa: E402
 import sequences  # noqa: E402
+import shell  # noqa: E402
 from chart import CHART  # noqa: E402
 from live_stage import HEIGHT, WIDTH, load, make_sequence  # noqa: E402
 from pictures import png_bytes  # noqa: E402
@@ -44,8 +45,7 @@ def get_steps():
     """Title and commands of each section that has some."""
     with open(os.path.join(SOURCE, 'docs/tutorial.md'), encoding='utf-8') as f:
         sections = re.split('^## ', f.read(), flags=re.M)[1:]
-    steps = [(s.split('\n')[0], re.findall(r'^```sh\n(.*?)^```', s, re.S | re.M)) for s in sections]
-    return [(title, blocks[0]) for title, blocks in steps if blocks]
+    return [(s.split('\n')[0], block) for s in sections for block in shell.get_blocks(s)]
 
 
 def draw_board(view):
@@ -125,33 +125,13 @@ class Desk:
     def show_probe(self, files, *more):
         self.show('127.0.0.1', (PROBE, PROBE), files, *more)
 
-    def run(self, block, until=None, timeout=100):
-        """Runs it to its end, or until until() and Ctrl-C; what was printed."""
+    def run(self, block, until=None):
+        """What was printed."""
         block = block.replace('--v4l2 ' + TABLE[0], '--gige ' + TABLE[1])
         assert TABLE[0] not in block, 'a camera that this test does not know: ' + block
         # Calibrating at the cameras' own 25 pictures a second takes a minute.
         block = re.sub(r'(gnomon calibrate \w+ --gige \S+)', r'\1 --frame-rate 100', block)
-        with tempfile.TemporaryFile('w+', encoding='utf-8', errors='replace') as log:
-            shell = subprocess.Popen(['bash', '-e', '-c', block], cwd=self.path, env=self.env, stdout=log,
-                                     stderr=subprocess.STDOUT, start_new_session=True)
-            deadline = time.monotonic() + timeout
-            try:
-                while shell.poll() is None and not (until and until()):
-                    assert time.monotonic() < deadline, 'it does not end'
-                    time.sleep(.05)
-                if shell.poll() is None:
-                    os.killpg(shell.pid, signal.SIGINT)
-                status = shell.wait(60)
-            finally:
-                try:
-                    os.killpg(shell.pid, signal.SIGTERM)
-                except ProcessLookupError:
-                    pass
-                log.seek(0)
-                text = log.read()
-                print('# ' + '\n# '.join(text.splitlines()[-12:]))
-        assert until or status == 0, 'exit status %d' % status
-        return text
+        return shell.run(block, self.path, self.env, until, 100)
 
     def rest(self):
         for camera in self.running:
@@ -245,7 +225,7 @@ def main():
             try:
                 check(desk, block)
                 print('ok %d - %s (%.1f s)' % (n, title, time.monotonic() - begin))
-            except (AssertionError, OSError, KeyError) as fault:
+            except (AssertionError, OSError, KeyError, RuntimeError) as fault:
                 failed = 1
                 print('# %s\nnot ok %d - %s' % (repr(fault).replace('\n', '\n# '), n, title))
             desk.rest()
