@@ -29,6 +29,7 @@ struct gn_poses {
     const char *source; // where the bodies are listed, borrowed
     int n_doubtful;     // pictures in a row that speak against that
     bool has_told;
+    char doubt[768]; // told last
     int64_t told_ns;
 };
 
@@ -163,10 +164,9 @@ static int write_line(const struct gn_poses *p, const struct gn_capture *capture
 /** Says what is wrong with the list of the bodies. */
 static void tell(struct gn_poses *p)
 {
-    char why[768];
-    if (!gn_tracker_explain(p->tracker, why, sizeof(why)))
+    if (!gn_tracker_explain(p->tracker, p->doubt, sizeof(p->doubt)))
         return;
-    fprintf(stderr, "gnomon: %s: %s\n", p->source, why);
+    fprintf(stderr, "gnomon: %s: %s\n", p->source, p->doubt);
     p->has_told = true;
     p->told_ns = gn_clock_get_monotonic_ns();
 }
@@ -178,6 +178,11 @@ static void doubt(struct gn_poses *p)
     if (p->n_doubtful >= SURE_AFTER &&
         (!p->has_told || gn_clock_get_monotonic_ns() - p->told_ns >= tell_interval_ns))
         tell(p);
+}
+
+const char *gn_poses_get_doubt(const struct gn_poses *p)
+{
+    return p->has_told && p->n_doubtful >= SURE_AFTER ? p->doubt : NULL;
 }
 
 int gn_poses_take(struct gn_poses *p, const struct gn_capture *capture, struct gn_error *out_error)

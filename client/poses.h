@@ -82,6 +82,10 @@ int64_t gn_poses_get_time_ns(const struct gn_capture *capture);
 GN_MUST_USE int gn_poses_take(struct gn_poses *poses, const struct gn_capture *capture,
                               struct gn_error *out_error);
 
+/** What the last pictures say against the list of the markers, as it was told; NULL: nothing.
+ * Borrowed until the next picture. */
+const char *gn_poses_get_doubt(const struct gn_poses *poses);
+
 /** Where the camera of the last picture was. False where the world's markers were not seen. */
 bool gn_poses_get_camera(const struct gn_poses *poses, struct gn_pose *out_world_from_camera);
 /** Where the body of that index was. False where it or the world was not seen. */

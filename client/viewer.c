@@ -159,6 +159,8 @@ static void show_trouble(struct gn_viewer *v)
         snprintf(text, sizeof(text), "no answer for %d s", (int)(longest_ns / GN_NS_PER_S));
     else if (v->n_dropped_since >= DROPPED_MIN)
         snprintf(text, sizeof(text), "no picture: %s", v->last_drop);
+    else if (v->poses && gn_poses_get_doubt(v->poses))
+        snprintf(text, sizeof(text), "%s", gn_poses_get_doubt(v->poses));
     gn_show_set_state(v->show, text[0] ? GN_SHOW_TROUBLE : GN_SHOW_LIVE, text);
 }
 

@@ -14,7 +14,7 @@ enum {
     SEARCH_INTERVAL = 15,
 };
 
-/** Between two looks for small markers while nothing is seen, ns. */
+/** Least time between two looks for small markers, ns. */
 static const int64_t small_interval_ns = 100 * 1000 * 1000;
 
 /** A marker of the last picture. */
@@ -167,7 +167,7 @@ static bool is_small_due(struct gn_watch *w, int64_t time_ns)
 {
     int64_t since_ns = time_ns - w->last_small_ns;
     bool is_first = w->counts.n_searched_whole == 0;
-    if (w->n_last == 0 && !is_first && since_ns >= 0 && since_ns < small_interval_ns)
+    if (!is_first && since_ns >= 0 && since_ns < small_interval_ns)
         return false;
     w->last_small_ns = time_ns;
     return true;

@@ -28,8 +28,8 @@ GN_MUST_USE int gn_watch_create(const struct gn_camera *camera, const struct gn_
 void gn_watch_destroy(struct gn_watch **watch);
 
 /**
- * Looks at the next picture of the camera's, taken at time_ns. While nothing is seen, small markers
- * are looked for every 100 ms only. Returns 0, or a negative errno and a sentence.
+ * Looks at the next picture of the camera's, taken at time_ns. Small markers are searched for
+ * once in 100 ms at most. Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_watch_update(struct gn_watch *watch, const struct gn_grey *grey, int64_t time_ns,
                                 struct gn_error *out_error);
