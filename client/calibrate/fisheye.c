@@ -149,17 +149,9 @@ static bool improve(struct fit *f, struct scratch *w, double *damping)
     for (int attempt = 0; attempt < 12; attempt++, *damping *= 10) {
         double step[MAX_PARAMETERS];
         memcpy(w->copy, w->jacobian, (size_t)(m * k) * sizeof(double));
-        for (int j = 0; j < k; j++) { // damping rows, in each column's own unit
-            double norm = 0;
-            for (int i = 0; i < m; i++)
-                norm = hypot(norm, w->jacobian[i * k + j]);
-            for (int i = 0; i < k; i++)
-                w->copy[(m + j) * k + i] = i == j ? sqrt(*damping) * norm : 0;
-            w->right[m + j] = 0;
-        }
         for (int i = 0; i < m; i++)
             w->right[i] = -w->residual[i];
-        if (gn_solve_least_squares(w->copy, w->right, m + k, k, step) < 0)
+        if (gn_solve_damped_squares(w->copy, w->right, m, k, *damping, step) < 0)
             continue;
         if (get_residuals(f, step, w->plus) && get_square(w->plus, m) < before) {
             struct gn_projection projection;

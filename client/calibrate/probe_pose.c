@@ -121,17 +121,9 @@ static double improve(const struct problem *p, double before, double *damping, s
     for (int attempt = 0; attempt < 10; attempt++, *damping *= 10) {
         double step[UNKNOWNS];
         fill(p, pose); // the solver destroys it
-        for (int k = 0; k < UNKNOWNS; k++) {
-            double norm = 0;
-            for (int i = 0; i < m; i++)
-                norm = hypot(norm, p->jacobian[i * UNKNOWNS + k]);
-            for (int i = 0; i < UNKNOWNS; i++)
-                p->jacobian[(m + k) * UNKNOWNS + i] = i == k ? sqrt(*damping) * norm : 0;
-            p->residual[m + k] = 0;
-        }
         for (int i = 0; i < m; i++)
             p->residual[i] = -p->residual[i];
-        if (gn_solve_least_squares(p->jacobian, p->residual, m + UNKNOWNS, UNKNOWNS, step) < 0)
+        if (gn_solve_damped_squares(p->jacobian, p->residual, m, UNKNOWNS, *damping, step) < 0)
             continue;
         struct gn_pose turn = {0}, tried = *pose;
         memset(tried.translation, 0, sizeof(tried.translation));

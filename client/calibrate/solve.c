@@ -61,6 +61,19 @@ int gn_solve_least_squares(double *a, double *b, int m, int n, double *out_x)
     return 0;
 }
 
+int gn_solve_damped_squares(double *a, double *b, int m, int n, double damping, double *out_x)
+{
+    for (int j = 0; j < n; j++) {
+        double norm = 0;
+        for (int i = 0; i < m; i++)
+            norm = hypot(norm, a[i * n + j]);
+        for (int i = 0; i < n; i++)
+            a[(m + j) * n + i] = i == j ? sqrt(damping) * norm : 0;
+        b[m + j] = 0;
+    }
+    return gn_solve_least_squares(a, b, m + n, n, out_x);
+}
+
 /* Turns columns p and q of the matrix by cosine c and sine s. */
 static void turn(double *matrix, int m, int n, int p, int q, double c, double s)
 {

@@ -24,6 +24,13 @@
 GN_MUST_USE int gn_solve_least_squares(double *a, double *b, int m, int n, double *out_x);
 
 /**
+ * The same with damping (Levenberg 1944) in each column's own unit: rows sqrt(damping) |column| are
+ * appended. a[m + n][n] and b[m + n] have room for them.
+ */
+GN_MUST_USE int gn_solve_damped_squares(double *a, double *b, int m, int n, double damping,
+                                        double *out_x);
+
+/**
  * a = u diag(s) v^T by one-sided Jacobi (Golub and Van Loan, 8.6.3): a[m][n] row-major becomes u,
  * s[n] falls, v[n][n] row-major has the right vectors in its columns. m >= n,
  * n <= GN_SOLVE_MAX_SVD. Columns of u that belong to a singular value of 0 are 0. Returns 0, or
