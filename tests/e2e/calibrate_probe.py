@@ -170,9 +170,15 @@ def test_refusals():
             ('--camera and --camera-files go together', '--markers', markers, '--camera', markers),
             ('no picture shows markers of "world" and of another body', '--markers', markers, '--camera',
              DESK.at('camera.json'), '--camera-files', black),
+            ('the place of "post" in the world: only 1 of 2 pictures agree', '--markers', markers, '--camera',
+             DESK.at('camera.json'), '--camera-files', DESK.at('[cm][ao][mv]*-0.png')),
             ('no orientation brings two spots', '--lamps', lamps, '--picture', DESK.at('lamps.png'))):
         refuse(words, 'near-0', out, *more)
     assert os.path.exists(DESK.at('wrong.png')) and count_pixels(DESK.at('lamps.png'), (255, 200, 0)) > 10
+    coarse = DESK.write_json('coarse.json', {'response': json.loads(before)['response']})
+    said = calibrate('near-0', coarse, '--markers', markers)[1]
+    assert 'no code is above 4095 of 65535: for 12 bits say --full-scale 4095' in said, said
+    assert 'says no response' in calibrate('near-0', DESK.at('new.json'), '--markers', markers)[1]
     done = subprocess.run([GNOMON, 'calibrate', 'probe', '--files', DESK.at('near-0.png'), '--projection',
                            'mirrorball', '--markers', markers, '--out', out], capture_output=True, text=True)
     assert done.returncode == 1 and 'from its surface' in done.stderr, done

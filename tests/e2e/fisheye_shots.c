@@ -4,9 +4,9 @@
  * Photographs of markers through a fisheye for tests: fisheye_shots MARKERS.json DIR writes into
  * DIR near-N.png (a probe that looks past the markers of the first two bodies), up-N.png (one on
  * the table that looks up and sees the second body alone), both in 12-bit log codes with noise, and
- * cam-N.png (a camera that sees both bodies); a lamp shines from far; probe.json (response alone)
- * and camera.json. To standard output the true poses, as matrices. The first body lies on the
- * table, the second stands.
+ * cam-N.png (a camera that sees both bodies) and moved-0.png (the second one elsewhere); a lamp
+ * shines from far; probe.json (response alone) and camera.json. To standard output the true poses,
+ * as matrices. The first body lies on the table, the second stands.
  */
 #include <math.h>
 #include <stdio.h>
@@ -15,9 +15,9 @@
 
 #include "client/track/bodies.h"
 #include "client/track/rotation.h"
-#include "client/vision/markers.h"
 #include "common/pose.h"
 #include "common/png.h"
+#include "tests/e2e/sheets.h"
 #include "tests/rig/marker_picture.h"
 #include "tests/rig/random.h"
 
@@ -44,29 +44,6 @@ static const double lamp[3] = {-0.291386, 0.388514, 0.874157}, lamp_rad = 3 * de
                     lamp_light = 25;
 
 static struct gn_rig_sheet sheets[2];
-
-static int print_sheet(const struct gn_bodies *bodies, int body, struct gn_rig_sheet *out)
-{
-    const struct gn_body *b = &bodies->bodies[body];
-    for (int i = 0; i < b->n_markers && i < GN_RIG_SHEET_MARKERS; i++) {
-        double(*c)[3] = b->markers[i].corners_body;
-        struct gn_rig_printed *p = &out->printed[out->n_printed++];
-        *p = (struct gn_rig_printed){
-            .x = (c[0][0] + c[2][0]) / 2, .y = (c[0][1] + c[2][1]) / 2, .size = c[1][0] - c[0][0]};
-        p->cells = gn_marker_get_cells(bodies->dictionary, b->markers[i].id, p->white);
-        out->half_width = fmax(out->half_width, fabs(p->x) + 0.7 * p->size);
-        out->half_height = fmax(out->half_height, fabs(p->y) + 0.7 * p->size);
-    }
-    return out->n_printed;
-}
-
-static void print_matrix(const char *name, const double m[static 16], const char *end)
-{
-    printf("\"%s\": [", name);
-    for (int i = 0; i < 16; i++)
-        printf("%s%.17g", i ? ", " : "", m[i]);
-    printf("]%s", end);
-}
 
 static void light_lamp(const struct gn_rig_marker_camera *fisheye, struct gn_image *linear)
 {
@@ -119,7 +96,7 @@ static int shoot_probe(struct gn_rig_marker_camera *fisheye, const char *dir, co
         err = write_codes(path, &linear, (uint32_t)(100 * strlen(name) + (size_t)i), &sensor);
     }
     gn_image_finish(&linear);
-    print_matrix(name, m, ",\n");
+    gn_test_print_matrix(name, m, ",\n");
     char path[4096];
     snprintf(path, sizeof(path), "%s/probe.json", dir);
     FILE *out = fopen(path, "w");
@@ -132,7 +109,7 @@ static int shoot_probe(struct gn_rig_marker_camera *fisheye, const char *dir, co
     return fclose(out) | err;
 }
 
-static int shoot_camera(const char *dir)
+static int shoot_camera(const char *dir, const char *name, int n)
 {
     static const struct gn_rig_noise noise = {.slope = 1e-4, .offset = 2e-6};
     struct gn_rig_marker_camera camera;
@@ -141,14 +118,14 @@ static int shoot_camera(const char *dir)
     char path[4096];
     int err =
         gn_rig_marker_camera_init(&camera, &pinhole) | gn_image8_init(&codes, WIDTH, HEIGHT, 3);
-    for (int i = 0; i < SHOTS && !err; i++) {
+    for (int i = 0; i < n && !err; i++) {
         const double eye[3] = {0.25 * i - 0.2, -0.4, 0.4 + 0.05 * i}, target[3] = {0, 0.1, 0.05};
         gn_rig_look_at(eye, target, camera.view.world_from_camera);
         err = gn_rig_take_markers(&camera, sheets, 2, &linear);
         if (err)
             break;
         gn_rig_photograph(linear.data, WIDTH * HEIGHT, &noise, 3, i, codes.data);
-        snprintf(path, sizeof(path), "%s/cam-%d.png", dir, i);
+        snprintf(path, sizeof(path), "%s/%s-%d.png", dir, name, i);
         err = gn_png_write_file(path, &codes, NULL);
         gn_image_finish(&linear);
     }
@@ -171,7 +148,8 @@ int main(int argc, char *argv[])
     struct gn_rig_marker_camera fisheye;
     struct gn_error error = {0};
     if (argc != 3 || gn_bodies_read_file(argv[1], &bodies, &error) < 0 || bodies.n_bodies < 2 ||
-        print_sheet(&bodies, 0, &sheets[0]) < 1 || print_sheet(&bodies, 1, &sheets[1]) < 1 ||
+        gn_test_print_sheet(&bodies, 0, &sheets[0]) < 1 ||
+        gn_test_print_sheet(&bodies, 1, &sheets[1]) < 1 ||
         gn_rig_marker_fisheye_init(&fisheye, &lens) < 0) {
         fprintf(stderr, "fisheye_shots: %s\n", error.text);
         return 1;
@@ -190,9 +168,13 @@ int main(int argc, char *argv[])
     gn_rotation_exp((const double[3]){0.06, -0.04, 1.1}, up.rotation);
     printf("{");
     err = err || shoot_probe(&fisheye, argv[2], "near", &near) ||
-          shoot_probe(&fisheye, argv[2], "up", &up) || shoot_camera(argv[2]);
+          shoot_probe(&fisheye, argv[2], "up", &up) || shoot_camera(argv[2], "cam", SHOTS);
     gn_pose_to_matrix(&standing, m);
-    print_matrix("standing", m, "}\n");
+    gn_test_print_matrix("standing", m, "}\n");
+    standing.translation[0] += 0.05;
+    gn_rotation_exp((const double[3]){70 * degree, 0.1, 0.1}, standing.rotation);
+    gn_pose_to_matrix(&standing, sheets[1].world_from_sheet);
+    err = err || shoot_camera(argv[2], "moved", 1);
     gn_rig_marker_camera_finish(&fisheye);
     gn_bodies_finish(&bodies);
     return err != 0;

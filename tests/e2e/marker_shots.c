@@ -13,43 +13,17 @@
 
 #include "client/track/bodies.h"
 #include "client/track/rotation.h"
-#include "client/vision/markers.h"
 #include "common/pose.h"
 #include "common/png.h"
+#include "tests/e2e/sheets.h"
 #include "tests/rig/marker_picture.h"
 
 enum { WIDTH = 320, HEIGHT = 240 };
 
-static int print_sheet(const struct gn_bodies *bodies, int body, struct gn_rig_sheet *out)
-{
-    const struct gn_body *b = &bodies->bodies[body];
-    memset(out, 0, sizeof(*out));
-    for (int i = 0; i < b->n_markers && i < GN_RIG_SHEET_MARKERS; i++) {
-        double(*c)[3] = b->markers[i].corners_body;
-        struct gn_rig_printed *p = &out->printed[out->n_printed++];
-        *p = (struct gn_rig_printed){
-            .x = (c[0][0] + c[2][0]) / 2, .y = (c[0][1] + c[2][1]) / 2, .size = c[1][0] - c[0][0]};
-        p->cells = gn_marker_get_cells(bodies->dictionary, b->markers[i].id, p->white);
-        out->half_width = fmax(out->half_width, fabs(p->x) + 0.7 * p->size);
-        out->half_height = fmax(out->half_height, fabs(p->y) + 0.7 * p->size);
-    }
-    return out->n_printed;
-}
-
-static void print_matrix(const char *name, const struct gn_pose *pose)
-{
-    double m[16];
-    gn_pose_to_matrix(pose, m);
-    printf("\"%s\": [", name);
-    for (int i = 0; i < 16; i++)
-        printf("%s%.17g", i ? ", " : "", m[i]);
-    printf("]");
-}
-
 static int shoot(struct gn_rig_marker_camera *camera, struct gn_rig_sheet *sheets, int n_sheets,
                  int frame, const char *dir)
 {
-    double t = frame, place[16];
+    double t = frame, place[16], m[16];
     const double eye[3] = {0.35 * sin(t), -0.3 + 0.1 * cos(2 * t), 0.45 + 0.04 * sin(3 * t)};
     const double target[3] = {0.06, 0, 0};
     struct gn_pose world_from_camera, object = {.translation = {0.15, 0.02 * t - 0.05, 0}};
@@ -71,10 +45,9 @@ static int shoot(struct gn_rig_marker_camera *camera, struct gn_rig_sheet *sheet
     gn_rig_photograph(linear.data, WIDTH * HEIGHT, &noise, 3, frame, codes.data);
     int err = gn_png_write_file(path, &codes, NULL);
     printf("{\"empty\": %s, ", is_empty ? "true" : "false");
-    print_matrix("world_from_camera", &world_from_camera);
-    printf(", ");
-    print_matrix("world_from_object", &object);
-    printf("}\n");
+    gn_pose_to_matrix(&world_from_camera, m);
+    gn_test_print_matrix("world_from_camera", m, ", ");
+    gn_test_print_matrix("world_from_object", place, "}\n");
     gn_image_finish(&linear);
     gn_image8_finish(&codes);
     return err < 0;
@@ -95,7 +68,8 @@ int main(int argc, char *argv[])
     struct gn_rig_marker_camera camera;
     struct gn_error error = {0};
     if (argc != 4 || gn_bodies_read_file(argv[1], &bodies, &error) < 0 || bodies.n_bodies < 2 ||
-        print_sheet(&bodies, 0, &sheets[0]) < 1 || print_sheet(&bodies, 1, &sheets[1]) < 1 ||
+        gn_test_print_sheet(&bodies, 0, &sheets[0]) < 1 ||
+        gn_test_print_sheet(&bodies, 1, &sheets[1]) < 1 ||
         gn_rig_marker_camera_init(&camera, &view) < 0) {
         fprintf(stderr, "marker_shots: %s\n", error.text);
         return 1;
