@@ -73,14 +73,19 @@ static int make_gray(const struct gn_image *image, struct gn_image *out)
 static int make_light(const struct gn_probe_run *run, const struct gn_image *image,
                       struct gn_image *out)
 {
+    enum { AT_ONCE = 512 };
     long n = (long)image->width * image->height;
-    int err = gn_image_init(out, image->width, image->height, 1);
-    for (long i = 0; !err && i < n; i++) {
-        const float *p = image->data + i * image->channels;
-        float rgb[3] = {p[0], p[image->channels == 3 ? 1 : 0], p[image->channels == 3 ? 2 : 0]};
+    int err = gn_image_init(out, image->width, image->height, 1), channels = image->channels;
+    for (long from = 0; !err && from < n; from += AT_ONCE) {
+        float rgb[AT_ONCE][3];
+        int count = (int)(n - from < AT_ONCE ? n - from : AT_ONCE);
+        for (int i = 0; i < count; i++)
+            for (int c = 0; c < 3; c++)
+                rgb[i][c] = image->data[(from + i) * channels + (channels == 3 ? c : 0)];
         if (run->step > 0)
-            gn_response_to_radiance(&run->setup.response, rgb, 1);
-        out->data[i] = 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+            gn_response_to_radiance(&run->setup.response, rgb[0], count);
+        for (int i = 0; i < count; i++)
+            out->data[from + i] = 0.2126f * rgb[i][0] + 0.7152f * rgb[i][1] + 0.0722f * rgb[i][2];
     }
     return err;
 }
@@ -138,7 +143,7 @@ static int add_picture(struct gn_probe_run *run, int i, struct gn_error *out_err
         (make_gray(&image, &gray) < 0 || make_light(run, &image, &light) < 0 ||
          keep_largest(&run->first, &gray) < 0 || keep_largest(&run->first_light, &light) < 0))
         err = gn_error_set(out_error, -ENOMEM, "out of memory");
-    if (!err && i == 0 && run->step > 0)
+    if (!err && i == 0 && run->step > 0 && !gn_probe_run_has(run, "ball"))
         hint(run, &image);
     if (!err && run->n_lamps > 0)
         err = gn_probe_run_look_for_lamps(run, i, &light, out_error);

@@ -76,7 +76,7 @@ static void print_marker(const struct gn_probe_run *run, const struct gn_probe_m
 {
     int body, marker;
     printf("  marker %d: %.0f px wide%s", m->seen.id, m->seen.width_px,
-           m->seen.is_coarse ? ", too small to measure its edges" : "");
+           m->seen.is_coarse ? ", too small, dim or blurred to measure its edges" : "");
     if (!gn_bodies_find_marker(&run->bodies, m->seen.id, &body, &marker))
         printf("; not listed, left out");
     else if (m->sighting < 0)

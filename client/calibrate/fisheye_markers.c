@@ -14,6 +14,8 @@
 
 /** What a view that looks straight at a marker shows, in half widths of the marker. */
 static const double surround = 1.6;
+/** Width of a cell in it: edges are measured over 3 px to each side, a third of one. */
+static const double cell_px = 9;
 
 /** A marker as a view has it. */
 struct candidate {
@@ -22,6 +24,8 @@ struct candidate {
     double middle[3]; // unit
     double radius;    // rad, from the middle to the farthest corner
     double off_axis;  // rad, from the view's
+    double error_px;  // of the fisheye's picture, once refined
+    bool is_fine;
     bool is_twice;
 };
 
@@ -114,14 +118,17 @@ static void add(struct gn_fisheye_finder *f, const struct gn_rectified_view *vie
         f->candidates[f->n_candidates++] = c;
 }
 
-/** Measures the edges in a view straight at the marker. */
-static int refine(struct gn_fisheye_finder *f, const struct gn_image *light, struct candidate *c,
-                  bool *out_is_fine)
+/**
+ * Measures the edges in a view straight at the marker, in which its cells are cell_px wide, or less
+ * where the picture has no more to tell: then its blur is narrow beside a cell.
+ */
+static int refine(struct gn_fisheye_finder *f, const struct gn_image *light, struct candidate *c)
 {
     struct gn_rectified_view view;
     struct gn_grey grey = {.pixels = f->grey.data};
-    double corners[4][2];
-    gn_rectify_aim(c->middle, surround * tan(c->radius), f->views[0].focal, &view);
+    double corners[4][2], half_width = tan(fmax(c->radius, 1e-3)), finest = f->views[0].focal;
+    double focal = cell_px * f->cells / (sqrt(2) * half_width); // of a square, seen straight
+    gn_rectify_aim(c->middle, surround * half_width, fmin(focal, finest), &view);
     int err = gn_rectify_take(&view, &f->projection, light, 1 / surround, &f->grey, grey.linear);
     if (err)
         return err;
@@ -134,20 +141,22 @@ static int refine(struct gn_fisheye_finder *f, const struct gn_image *light, str
     grey.width = grey.height = view.side;
     for (int k = 0; k < 4; k++)
         (void)gn_rectify_get_position(&view, c->dirs[k], corners[k]); // about its axis: in front
-    *out_is_fine = gn_edges_refine(&grey, &camera, f->cells, corners);
-    if (!*out_is_fine)
+    c->is_fine = gn_edges_refine(&grey, &camera, f->cells, corners);
+    if (!c->is_fine)
         gn_edges_widen(corners, 0.5);
     for (int k = 0; k < 4; k++)
         gn_rectify_get_direction(&view, corners[k], c->dirs[k]);
+    c->error_px =
+        (c->is_fine ? GN_FISHEYE_EDGE_ERROR_PX : GN_FISHEYE_COARSE_ERROR_PX) * finest / view.focal;
     return 0;
 }
 
 /** False where the picture does not show all corners. */
-static bool finish(const struct gn_fisheye_finder *f, const struct candidate *c, bool is_fine,
+static bool finish(const struct gn_fisheye_finder *f, const struct candidate *c,
                    struct gn_fisheye_marker *out)
 {
     double px = 0, rad = 0;
-    *out = (struct gn_fisheye_marker){.id = c->id, .is_coarse = !is_fine};
+    *out = (struct gn_fisheye_marker){.id = c->id, .is_coarse = !c->is_fine};
     memcpy(out->dirs, c->dirs, sizeof(out->dirs));
     for (int k = 0; k < 4; k++)
         if (!gn_projection_get_position(&f->projection, out->dirs[k], out->corners_px[k]))
@@ -158,7 +167,7 @@ static bool finish(const struct gn_fisheye_finder *f, const struct candidate *c,
         rad += get_angle(out->dirs[k], out->dirs[(k + 1) % 4]);
     }
     out->width_px = px / 4;
-    out->error_rad = (is_fine ? GN_FISHEYE_EDGE_ERROR_PX : GN_FISHEYE_COARSE_ERROR_PX) * rad / px;
+    out->error_rad = c->error_px * rad / px;
     return rad > 0;
 }
 
@@ -180,13 +189,12 @@ int gn_fisheye_finder_find(struct gn_fisheye_finder *f, const struct gn_image *l
     }
     for (int i = 0; i < f->n_candidates && !err; i++) {
         struct candidate *c = &f->candidates[i];
-        bool is_fine = false;
         n_twice += c->is_twice;
         if (c->is_twice)
             continue;
-        if (refine(f, light, c, &is_fine) < 0)
+        if (refine(f, light, c) < 0)
             return gn_error_set(out_error, -ENOMEM, "out of memory");
-        n += finish(f, c, is_fine, &out_markers[n]);
+        n += finish(f, c, &out_markers[n]);
     }
     if (out_n_twice)
         *out_n_twice = n_twice;

@@ -19,7 +19,7 @@
 #define GN_FISHEYE_MAX_MARKERS 512
 
 /** px of the fisheye's picture, per coordinate: a corner's error where edges were measured, and
- * where they could not be. */
+ * where they could not be; more for markers with cells of more than some pixels. */
 #define GN_FISHEYE_EDGE_ERROR_PX 0.03
 #define GN_FISHEYE_COARSE_ERROR_PX 0.5
 

@@ -109,6 +109,26 @@ static void find_range(const float *taken, int side, double core, float *scratch
     *out_low = n > 0 ? fmax((double)scratch[n / 100], *out_high / max_range) : 0;
 }
 
+/** The mean of across x across places of a pixel; negative where the picture lacks one. */
+static float take_pixel(const struct gn_rectified_view *view,
+                        const struct gn_projection *projection, const struct gn_image *light, int x,
+                        int y, int across)
+{
+    float sum = 0;
+    for (int i = 0; i < across * across; i++) {
+        const double xy[2] = {x + (i % across + 0.5) / across,
+                              y + ((double)(i / across) + 0.5) / across};
+        double dir[3], at[2];
+        gn_rectify_get_direction(view, xy, dir);
+        float v =
+            gn_projection_get_position(projection, dir, at) ? sample(light, at[0], at[1]) : -1;
+        if (v < 0)
+            return -1;
+        sum += v;
+    }
+    return sum / (float)(across * across);
+}
+
 int gn_rectify_take(const struct gn_rectified_view *view, const struct gn_projection *projection,
                     const struct gn_image *light, double core, struct gn_image8 *out_grey,
                     float out_linear[static 256])
@@ -117,14 +137,10 @@ int gn_rectify_take(const struct gn_rectified_view *view, const struct gn_projec
     float *taken = malloc(2 * n * sizeof(*taken));
     if (!taken)
         return -ENOMEM;
-    for (size_t i = 0; i < n; i++) {
-        const double xy[2] = {(double)(i % (size_t)view->side) + 0.5,
-                              (double)(i / (size_t)view->side) + 0.5};
-        double dir[3], at[2];
-        gn_rectify_get_direction(view, xy, dir);
+    int across = (int)fmin(ceil(projection->focal / view->focal), 8);
+    for (size_t i = 0; i < n; i++)
         taken[i] =
-            gn_projection_get_position(projection, dir, at) ? sample(light, at[0], at[1]) : -1;
-    }
+            take_pixel(view, projection, light, (int)i % view->side, (int)i / view->side, across);
     double low, high;
     find_range(taken, view->side, core, taken + n, &low, &high);
     double decades = high > low && low > 0 ? log(high / low) : 0;

@@ -47,9 +47,10 @@ bool gn_rectify_get_position(const struct gn_rectified_view *view, const double 
 /**
  * Takes the view of a picture of linear light (1 channel) as codes of 8 bits on a logarithmic
  * scale, three decades at most, from the darkest to the lightest percent of what lies within `core`
- * (0, 1] of its middle, black where the picture shows nothing. out_grey: initialised, 1 channel,
- * side x side. out_linear: the light that each code stands for, the largest 1. Returns 0 or
- * -ENOMEM.
+ * (0, 1] of its middle, black where the picture shows nothing. A pixel that holds several of the
+ * picture's is the mean of so many places. out_grey: initialised, 1 channel, of
+ * side x side samples at least, which are written without a gap. out_linear: the light that each
+ * code stands for, the largest 1. Returns 0 or -ENOMEM.
  */
 GN_MUST_USE int gn_rectify_take(const struct gn_rectified_view *view,
                                 const struct gn_projection *projection,
