@@ -325,10 +325,10 @@ def check_raw_photographs():
             assert len(errors) == 7 and all(e < 3 and n >= 5 for e, n in errors), out
             table = json.load(open(f.at('camera.json')))['response']['table']
             assert len(table) == 4096 and table[-1] > 0
-            # Each alone shows the chart, from nearly black to nearly white.
-            for i in range(len(times)):
-                refuse('one exposure alone', 'response', '--chart', f.at('shot%d.png' % (i + 1)), '--bayer',
-                       'gbrg', '--no-matrix', '--out', f.at('x.json'))
+            # Nearly black or nearly white, one alone shows the chart.
+            for shot in ('shot1.png', 'shot7.png'):
+                refuse('one exposure alone', 'response', '--chart', f.at(shot), '--bayer', 'gbrg', '--no-matrix',
+                       '--out', f.at('x.json'))
 
 
 def check_photograph_in_colour():
