@@ -23,11 +23,10 @@
 
 #include "common/clock.h"
 #include "common/image_file.h"
-#include "common/options.h"
 #include "common/response.h"
-#include "proto/attr.h"
 #include "tests/random.h"
 #include "tests/rig/gige_genicam.h"
+#include "tests/rig/gige_options.h"
 #include "tests/rig/gige_picture.h"
 
 #define GVCP_PORT 3956
@@ -52,145 +51,6 @@
 /** Some faults begin after so many frames. */
 #define N_FAULTLESS 20
 #define DIM_US 600000
-
-enum fault {
-    FAULT_NONE,
-    FAULT_SIZE,
-    FAULT_FORMAT,
-    FAULT_TRUNCATED,
-    FAULT_CODES,
-    FAULT_HUGE,
-    FAULT_DROP,
-    FAULT_CHANGE,
-    FAULT_SILENT,
-    FAULT_DIM
-};
-
-static const struct gn_option option_table[] = {
-    {.key = "address",
-     .flag = "address",
-     .type = GN_OPTION_STRING,
-     .default_value = "127.0.0.1",
-     .help = "Where it is found; at another than the default only by that address."},
-    {.key = "serial",
-     .flag = "serial",
-     .type = GN_OPTION_STRING,
-     .default_value = "GN01",
-     .help = "Its serial number."},
-    {.key = "stock",
-     .flag = "stock",
-     .type = GN_OPTION_BOOL,
-     .default_value = "false",
-     .help = "Be Aravis' own fake camera, on the interface lo: no resends, no faults, no files."},
-    {.key = "width",
-     .flag = "width",
-     .type = GN_OPTION_INT,
-     .min = 1,
-     .max = 8192,
-     .default_value = "640",
-     .help = "Pixels."},
-    {.key = "height",
-     .flag = "height",
-     .type = GN_OPTION_INT,
-     .min = 1,
-     .max = 8192,
-     .default_value = "480",
-     .help = "Pixels."},
-    {.key = "files",
-     .flag = "files",
-     .type = GN_OPTION_STRING,
-     .value_name = "PATTERN",
-     .help = "PNG pictures to serve in turn: 16 bits are 12-bit codes, 8 bits are widened. "
-             "Without it a pattern that differs in every picture and pixel."},
-    {.key = "step-s",
-     .flag = "step-s",
-     .type = GN_OPTION_DOUBLE,
-     .min = 0,
-     .max = 1000,
-     .default_value = "0",
-     .help = "How long each file is served; 0: one picture each."},
-    {.key = "response",
-     .flag = "response",
-     .type = GN_OPTION_STRING,
-     .value_name = "CURVE",
-     .help = "The files are light, full scale 1 at an exposure of 10 ms, and what is sent are its "
-             "codes at the exposure set: log:A,B,C (code = A + B ln(C + light)), srgb or linear. "
-             "An exposure holds from the second picture after it was set on."},
-    {.key = "noise",
-     .flag = "noise",
-     .type = GN_OPTION_DOUBLE,
-     .min = 0,
-     .max = 100,
-     .default_value = "0",
-     .help = "Deviation of the codes, of 4095, with --response."},
-    {.key = "loss",
-     .flag = "loss",
-     .type = GN_OPTION_DOUBLE,
-     .min = 0,
-     .max = 1,
-     .default_value = "0",
-     .help = "Share of packets that are lost when first sent."},
-    {.key = "no-resend",
-     .flag = "no-resend",
-     .type = GN_OPTION_BOOL,
-     .default_value = "false",
-     .help = "Do not send packets again, and say so."},
-    {.key = "chunks",
-     .flag = "chunks",
-     .type = GN_OPTION_BOOL,
-     .default_value = "false",
-     .help = "Stamp pictures in a chunk behind them, where the client asks for it, and nowhere "
-             "else."},
-    {.key = "delay-ms",
-     .flag = "delay-ms",
-     .type = GN_OPTION_DOUBLE,
-     .min = 0,
-     .max = 1000,
-     .default_value = "0",
-     .help = "Pictures leave up to so much after they were taken, at random."},
-    {.key = "fault",
-     .flag = "fault",
-     .type = GN_OPTION_ENUM,
-     .choices = "none|size|format|truncated|codes|huge|drop|change|silent|dim",
-     .default_value = "none",
-     .help = "Lie: pictures of another size or format than agreed, their end missing, codes above "
-             "the format's, or an absurd size. drop: each fifth picture never leaves; change: "
-             "another size from the 20th on; silent: no picture ever leaves; dim: from the 20th on "
-             "each is exposed for 0.6 s."},
-    {.key = "trigger-ms",
-     .flag = "trigger-ms",
-     .type = GN_OPTION_DOUBLE,
-     .min = 0,
-     .max = 1e6,
-     .default_value = "0",
-     .help = "How often a trigger comes, for a client that sets TriggerMode=On; 0: never."},
-    {.key = "max-packet",
-     .flag = "max-packet",
-     .type = GN_OPTION_INT,
-     .min = 100,
-     .max = 65535,
-     .default_value = "65535",
-     .help = "Packets of pictures of more bytes, with their IP heads, do not arrive."},
-    {.key = "description",
-     .flag = "description",
-     .type = GN_OPTION_STRING,
-     .value_name = "URL",
-     .help = "Where it says that its GenICam file is, instead of in its memory."},
-    {.key = "said-address",
-     .flag = "said-address",
-     .type = GN_OPTION_STRING,
-     .value_name = "ADDRESS",
-     .help = "What it says its address is."},
-};
-
-static const struct gn_program program = {
-    .name = "gnomon-fake-gige",
-    .usage = "[OPTION]...",
-    .summary = "A GigE Vision camera on loopback, for tests.",
-    .notes = "",
-    .options = option_table,
-    .n_options = GN_ARRAY_LEN(option_table),
-};
 
 /** A frame that was sent and may be asked for again. */
 struct frame {
@@ -741,10 +601,10 @@ int main(int argc, char *argv[])
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    int err = gn_options_load(&program, argc, argv, &options, &error);
+    int err = gn_options_load(&gn_gige_program, argc, argv, &options, &error);
     const char *genicam = err ? NULL : gn_gige_write_genicam();
     if (!err && gn_options_wants_help(options)) {
-        gn_options_print_help(&program, stdout);
+        gn_options_print_help(&gn_gige_program, stdout);
     } else if (!err && !genicam) {
         err = gn_error_set(&error, -EIO, "cannot write its GenICam file");
     } else if (!err && gn_options_get_bool(options, NULL, NULL, "stock")) {
