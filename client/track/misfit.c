@@ -10,7 +10,7 @@
 #include "client/track/pose_fit.h"
 #include "client/track/quad.h"
 
-enum { MAX_POINTS = GN_BODY_MAX_MARKERS * 4, MAX_FITS = 200 };
+enum { MAX_POINTS = GN_BODY_MAX_MARKERS * 4, MAX_FITS = 64 };
 
 /** What a fit is made under. */
 struct guess {
@@ -139,8 +139,7 @@ static double leave_one_out(struct work *w)
 /** Leaves out as few as can be, less than half; false where the rest never fit. */
 static bool leave_some_out(struct work *w)
 {
-    int n_fits = w->n;
-    for (int n_out = 1; 2 * n_out < w->n && n_fits <= MAX_FITS; n_out++, n_fits += w->n)
+    for (int n_out = 1; 2 * n_out < w->n && n_out * w->n <= MAX_FITS; n_out++)
         if (leave_one_out(w) <= w->limit_px)
             return true;
     memset(w->is_out, 0, sizeof(w->is_out));

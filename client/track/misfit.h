@@ -28,7 +28,7 @@ struct gn_misfit_view {
 
 /**
  * Writes what is wrong, as far as one thing explains it, as the end of a sentence. False where
- * nothing is, or memory is short. Takes some milliseconds. Thread-safety: safe.
+ * nothing is, or memory is short. Takes 5 ms for a few markers, 0.1 s for 60. Thread-safety: safe.
  */
 bool gn_misfit_explain(const struct gn_misfit_view *view, char *out, size_t out_bytes);
 

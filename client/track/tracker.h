@@ -90,7 +90,7 @@ bool gn_tracker_get_between(const struct gn_tracker *tracker, int base, int body
  * them; other ids, or another dictionary, where none of its own is seen.
  */
 bool gn_tracker_is_doubtful(const struct gn_tracker *tracker);
-/** Writes what does, as a sentence; false where nothing does. Takes some milliseconds. */
+/** Writes what does, as a sentence; false where nothing does. As slow as gn_misfit_explain(). */
 bool gn_tracker_explain(const struct gn_tracker *tracker, char *out, size_t out_bytes);
 
 void gn_tracker_get_counts(const struct gn_tracker *tracker, struct gn_tracker_counts *out);
