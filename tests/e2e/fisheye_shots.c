@@ -20,6 +20,7 @@
 #include "tests/e2e/sheets.h"
 #include "tests/rig/marker_picture.h"
 #include "tests/rig/random.h"
+#include "tests/rig/sensor.h"
 
 enum { SIZE = 480, SHOTS = 2, WIDTH = 640, HEIGHT = 480 };
 

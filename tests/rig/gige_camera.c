@@ -23,11 +23,11 @@
 
 #include "common/clock.h"
 #include "common/image_file.h"
-#include "common/response.h"
 #include "tests/random.h"
 #include "tests/rig/gige_genicam.h"
 #include "tests/rig/gige_options.h"
 #include "tests/rig/gige_picture.h"
+#include "tests/rig/sensor.h"
 
 #define GVCP_PORT 3956
 /** Bootstrap registers (GigE Vision 2.0, 28). */
@@ -71,8 +71,7 @@ struct camera {
     bool can_resend, has_chunks;
     int n_files;
     struct gn_image16 *files;
-    bool has_response;
-    struct gn_response response;
+    struct gn_rig_curve response; // NONE: the files are codes
     struct gn_image16 exposed; // what the response makes of a file
     uint32_t exposure_us[2];   // of the next picture, and of the one after
     uint64_t random;
@@ -165,19 +164,6 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
 
 static void answer_waiting(struct camera *c, int timeout_ms);
 
-/** "log:0.6,0.07,0", "srgb", "linear". */
-static int read_response(const char *text, struct gn_response *out, struct gn_error *error)
-{
-    char name[16] = "", rest;
-    int n =
-        sscanf(text, "%15[a-z]:%lf,%lf,%lf%c", name, &out->log_a, &out->log_b, &out->log_c, &rest);
-    const char *reason = "no such curve";
-    if (gn_response_from_name(name, &out->type) < 0 ||
-        n != (out->type == GN_RESPONSE_LOG ? 4 : 1) || gn_response_check(out, &reason) < 0)
-        return gn_error_set(error, -EINVAL, "--response %s: %s", text, reason);
-    return 0;
-}
-
 /** The codes of a file's light at the exposure that holds now. */
 static const struct gn_image16 *expose(struct camera *c, const struct gn_image16 *light)
 {
@@ -190,9 +176,9 @@ static const struct gn_image16 *expose(struct camera *c, const struct gn_image16
             return NULL;
     }
     for (size_t i = 0; i < n; i++) {
-        float code = gn_response_encode(&c->response, (float)(light->data[i] * scale));
+        double code = gn_rig_encode_curve(&c->response, light->data[i] * scale);
         double noise = c->noise > 0 ? c->noise * gn_test_random_normal(&c->random) : 0;
-        out->data[i] = (uint16_t)lround(fmin(fmax(4095 * (double)code + noise, 0), 4095));
+        out->data[i] = (uint16_t)lround(fmin(fmax(4095 * code + noise, 0), 4095));
     }
     c->exposure_us[0] = c->exposure_us[1];
     c->exposure_us[1] = read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
@@ -249,10 +235,11 @@ static void send_frame(struct camera *c)
     double now_s = (double)(gn_clock_get_monotonic_ns() - c->begin_ns) * 1e-9;
     uint64_t k = c->step_s > 0 ? (uint64_t)(now_s / c->step_s) : c->n_frames;
     const struct gn_image16 *picture = c->n_files ? &c->files[k % (uint64_t)c->n_files] : NULL;
-    uint32_t exposure_us = c->has_response
+    bool has_response = c->response.type != GN_RIG_CURVE_NONE;
+    uint32_t exposure_us = has_response
                                ? c->exposure_us[0]
                                : read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
-    if (picture && c->has_response)
+    if (picture && has_response)
         picture = expose(c, picture);
     gn_gige_pack(format, picture, c->n_frames, width, height, f->data);
     if (has_chunks)
@@ -457,7 +444,7 @@ static int read_files(struct camera *c, const char *pattern, int width, int heig
         size_t n = (size_t)width * (size_t)height * (size_t)image->channels;
         for (size_t k = 0; k < n && !err; k++)
             c->files[i].data[k] = !is_8 ? file.codes16.data[k]
-                                  : c->has_response
+                                  : c->response.type != GN_RIG_CURVE_NONE
                                       ? (uint16_t)(file.codes8.data[k] * 257)
                                       : (uint16_t)((file.codes8.data[k] * 4095 + 127) / 255);
         gn_image_file_finish(&file);
@@ -570,8 +557,10 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
                                    c.fault == FAULT_HUGE ? 0x7ffffff0 : (uint32_t)width);
     arv_fake_camera_write_register(c.fake, ARV_FAKE_CAMERA_REGISTER_HEIGHT, (uint32_t)height);
     const char *response = gn_options_get_string(options, NULL, NULL, "response");
-    c.has_response = response != NULL;
-    int err = response ? read_response(response, &c.response, error) : 0;
+    int err = 0;
+    if (response && !gn_rig_read_curve(response, &c.response))
+        err = gn_error_set(error, -EINVAL, "--response %s: right would be log:A,B,C, srgb or linear",
+                           response);
     if (!err)
         err = open_sockets(&c, gn_options_get_string(options, NULL, NULL, "address"), error);
     if (!err)

@@ -16,6 +16,7 @@
 #include "common/png.h"
 #include "tests/rig/random.h"
 #include "tests/rig/room.h"
+#include "tests/rig/sensor.h"
 #include "tests/rig/sequence.h"
 #include "tests/rig/tracer.h"
 #include "tests/rig/vec.h"

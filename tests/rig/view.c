@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "tests/rig/random.h"
+#include "tests/rig/sensor.h"
 #include "tests/rig/vec.h"
 
 const double gn_rig_probe_position[3] = {0, 0, 0.3};
@@ -155,30 +156,6 @@ void gn_rig_get_quaternion(const double m[static 9], double out_q[static 4])
         n = -n;
     for (int i = 0; i < 4; i++)
         out_q[i] = rows[best][i] / n;
-}
-
-struct gn_rig_log_sensor gn_rig_make_log_sensor(double mean, double highest)
-{
-    double c = fmin(1e-6 * highest, 1e-3 * mean);
-    double b = 1 / log((c + highest) / c);
-    return (struct gn_rig_log_sensor){.a = -b * log(c), .b = b, .c = c};
-}
-
-int gn_rig_encode_log12(const struct gn_rig_log_sensor *sensor, double radiance)
-{
-    double code = 4095 * (sensor->a + sensor->b * log(sensor->c + radiance));
-    return code > 0 ? (int)fmin(4095, floor(code + 0.5)) : 0;
-}
-
-double gn_rig_decode_log12(const struct gn_rig_log_sensor *sensor, double code)
-{
-    return fmax(0, exp((code / 4095 - sensor->a) / sensor->b) - sensor->c);
-}
-
-double gn_rig_encode_srgb8(double linear)
-{
-    double v = linear > 0 ? fmin(1, linear) : 0;
-    return 255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055);
 }
 
 void gn_rig_photograph(const float *linear, long n, const struct gn_rig_noise *noise, uint64_t seed,

@@ -64,26 +64,11 @@ GN_MUST_USE int gn_rig_take_probe(const struct gn_rig_environment *env, enum gn_
 /** Quaternion w, x, y, z of a rotation matrix (3x3, row-major), w >= 0 (Shepperd 1978). */
 void gn_rig_get_quaternion(const double m[static 9], double out_q[static 4]);
 
-/** An HDRC-like sensor: code = a + b ln(c + radiance), as a share of full scale. */
-struct gn_rig_log_sensor {
-    double a, b, c;
-};
-
-/** The sensor whose codes 0 and 4095 are radiance 0 and `highest`, and whose dark current c is a
- * millionth of `highest` or a thousandth of `mean`, whichever is less. */
-struct gn_rig_log_sensor gn_rig_make_log_sensor(double mean, double highest);
-/** The 12-bit code, rounded and clamped; and back. */
-int gn_rig_encode_log12(const struct gn_rig_log_sensor *sensor, double radiance);
-double gn_rig_decode_log12(const struct gn_rig_log_sensor *sensor, double code);
-
 /**
  * 8-bit sRGB codes of a picture of linear values, noise added before the curve: another frame,
  * another noise. codes: [3 n], linear: [3 n].
  */
 void gn_rig_photograph(const float *linear, long n, const struct gn_rig_noise *noise, uint64_t seed,
                        int frame, uint8_t *out_codes);
-
-/** IEC 61966-2-1: linear to an 8-bit code, clamped, before rounding. */
-double gn_rig_encode_srgb8(double linear);
 
 #endif

@@ -17,6 +17,7 @@
 #include "common/probe_mask.h"
 #include "proto/attr.h"
 #include "tests/rig/environment.h"
+#include "tests/rig/sensor.h"
 #include "tests/rig/view.h"
 #include "tests/unit/cmocka_setup.h"
 

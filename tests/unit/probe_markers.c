@@ -17,6 +17,7 @@
 #include "client/vision/markers.h"
 #include "tests/rig/marker_picture.h"
 #include "tests/rig/random.h"
+#include "tests/rig/sensor.h"
 #include "tests/unit/cmocka_setup.h"
 
 #define PI 3.14159265358979323846

@@ -12,6 +12,7 @@
 #include "common/projection.h"
 #include "tests/meshes.h"
 #include "tests/rig/environment.h"
+#include "tests/rig/sensor.h"
 #include "tests/rig/vec.h"
 #include "tests/rig/view.h"
 
