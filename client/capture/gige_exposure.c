@@ -28,7 +28,9 @@ static int switch_off(ArvCamera *camera, const char *id, int i, struct gn_gige_n
     GError *error = NULL;
     if (!arv_camera_is_feature_available(camera, automatics[i], NULL))
         return 0;
-    const char *value = arv_camera_get_string(camera, automatics[i], NULL);
+    const char *value = arv_camera_get_string(camera, automatics[i], &error);
+    if (error)
+        return refuse(out_error, id, automatics[i], &error);
     if (!value || !*value || strcmp(value, "Off") == 0)
         return 0;
     char was[sizeof(noted->automatics[i])];
@@ -73,8 +75,15 @@ int gn_gige_exposure_hold(struct gn_gige_device *device, const char *id, enum gn
 int gn_gige_exposure_set(struct gn_gige_device *device, const char *id, double exposure_us,
                          double *out_exposure_us, struct gn_error *out_error)
 {
+    struct gn_gige_noted again = {0};
     GError *error = NULL;
     double least = 0, most = 0, took = 0;
+    // Where the camera was lost and is back they may be on again.
+    for (size_t i = 0; i < GN_ARRAY_LEN(automatics); i++) {
+        int err = switch_off(device->camera, id, (int)i, &again, out_error);
+        if (err)
+            return err;
+    }
     arv_camera_get_exposure_time_bounds(device->camera, &least, &most, &error);
     if (!error && !(exposure_us >= least && exposure_us <= most))
         return gn_error_set(out_error, -ERANGE,

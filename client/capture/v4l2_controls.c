@@ -221,9 +221,9 @@ static int change(const struct gn_v4l2_device *d, struct gn_v4l2_exposure *expos
     return set_value(d, &q, value, out_error);
 }
 
-int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_unit unit,
-                          struct gn_v4l2_exposure *exposure, struct gn_exposure *out,
-                          struct gn_error *out_error)
+/** What would change the picture by itself. */
+static int switch_off(const struct gn_v4l2_device *d, struct gn_v4l2_exposure *exposure,
+                      struct gn_error *out_error)
 {
     static const struct {
         uint32_t id;
@@ -232,6 +232,16 @@ int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_
                       {V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0},
                       {V4L2_CID_AUTOGAIN, 0},
                       {V4L2_CID_AUTO_WHITE_BALANCE, 0}};
+    int err = 0;
+    for (size_t i = 0; !err && i < GN_ARRAY_LEN(automatics); i++)
+        err = change(d, exposure, automatics[i].id, automatics[i].value, out_error);
+    return err;
+}
+
+int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_unit unit,
+                          struct gn_v4l2_exposure *exposure, struct gn_exposure *out,
+                          struct gn_error *out_error)
+{
     struct gn_v4l2_exposure held = {.unit_us = unit == GN_EXPOSURE_US ? EXPOSURE_UNIT_US : 0};
     struct v4l2_queryctrl q;
     held.id = unit == GN_EXPOSURE_US ? V4L2_CID_EXPOSURE_ABSOLUTE : V4L2_CID_EXPOSURE;
@@ -245,10 +255,8 @@ int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_
                       out_error);
         return -ENOTSUP;
     }
-    int err = 0;
     struct v4l2_control c = {.id = held.id};
-    for (size_t i = 0; !err && i < GN_ARRAY_LEN(automatics); i++)
-        err = change(device, &held, automatics[i].id, automatics[i].value, out_error);
+    int err = switch_off(device, &held, out_error);
     if (!err && gn_v4l2_device_call(device, VIDIOC_G_CTRL, &c) != 0)
         c.value = q.minimum; // write-only: nothing to put back
     else if (!err) {
@@ -272,6 +280,11 @@ int gn_v4l2_exposure_set(const struct gn_v4l2_device *device,
     struct v4l2_queryctrl q;
     double scale = exposure->unit_us > 0 ? exposure->unit_us : 1;
     const char *unit = exposure->unit_us > 0 ? " us" : "";
+    struct gn_v4l2_exposure again = {0};
+    // Where the camera was lost and is back they may be on again.
+    int err = switch_off(device, &again, out_error);
+    if (err)
+        return err;
     if (!find_control(device, exposure->id, &q))
         return gn_error_set(out_error, -EIO, "%s (%s): its exposure cannot be set any more",
                             device->path, device->card);
@@ -280,7 +293,7 @@ int gn_v4l2_exposure_set(const struct gn_v4l2_device *device,
             out_error, -ERANGE, "%s (%s): exposure %g%s is not in [%g, %g]%s, which it takes",
             device->path, device->card, value, unit, scale * q.minimum, scale * q.maximum, unit);
     struct v4l2_control c = {.id = q.id, .value = (int32_t)lround(value / scale)};
-    int err = gn_v4l2_device_call(device, VIDIOC_S_CTRL, &c);
+    err = gn_v4l2_device_call(device, VIDIOC_S_CTRL, &c);
     if (err)
         return gn_error_set(out_error, err, "%s (%s): exposure %g%s cannot be set: %s",
                             device->path, device->card, value, unit, strerror(-err));
@@ -297,10 +310,17 @@ int gn_v4l2_exposure_restore(const struct gn_v4l2_device *device, struct gn_v4l2
         struct v4l2_queryctrl q;
         int i = --exposure->n_noted;
         struct gn_error why = {0};
-        int err = find_control(device, exposure->noted[i].id, &q)
-                      ? set_value(device, &q, exposure->noted[i].value, &why)
-                      : gn_error_set(&why, -EIO, "%s (%s): it does not answer", device->path,
-                                     device->card);
+        struct v4l2_control c = {.id = exposure->noted[i].id, .value = exposure->noted[i].value};
+        int err;
+        if (!find_control(device, c.id, &q))
+            err =
+                gn_error_set(&why, -EIO, "%s (%s): it does not answer", device->path, device->card);
+        else if (c.id != exposure->id)
+            err = set_value(device, &q, c.value, &why);
+        else if ((err = gn_v4l2_device_call(device, VIDIOC_S_CTRL, &c)) < 0)
+            // An automatic may have come to what cannot be set: the nearest is taken.
+            gn_error_set(&why, err, "%s (%s): its exposure cannot be put back: %s", device->path,
+                         device->card, strerror(-err));
         if (err && !first)
             first = gn_error_set(out_error, err, "%s", why.text);
     }

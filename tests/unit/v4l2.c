@@ -614,6 +614,21 @@ static void test_exposure_is_held_and_put_back(void **state)
     assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO_PRIORITY), 1);
     assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 1);
     assert_int_equal(get_value(&fake, V4L2_CID_AUTO_WHITE_BALANCE), 1);
+    // An automatic had come to what cannot be set by hand.
+    gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_ABSOLUTE)->value = 252;
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error), 0);
+    assert_int_equal(gn_source_restore_exposure(source, &error), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_ABSOLUTE), 250);
+    // Plugged in again: its automatics are as they were made.
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error), 0);
+    gn_fake_get_control(&fake, V4L2_CID_AUTOGAIN)->value = 1;
+    gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_AUTO)->value = V4L2_EXPOSURE_AUTO;
+    assert_int_equal(gn_source_set_exposure(source, 5000, &took, &error), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_MANUAL);
+    assert_int_equal(gn_source_restore_exposure(source, &error), 0);
+    assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 1);
+    assert_int_equal(get_value(&fake, V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_APERTURE_PRIORITY);
     fake.is_gone = true;
     assert_true(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error) < 0);
     gn_source_close(&source);
