@@ -24,6 +24,8 @@
  * what each has; and how far off what it says may be. */
 #define MAX_WAIT 50
 #define SAME_EXPOSURE 0.005
+/* How often one exposure is begun, where the camera is lost and comes back meanwhile. */
+#define MAX_TRIES 10
 /* --exposures auto: none longer; a picture tells something from this span of codes on; the end. */
 #define AUTO_MOST_US 1e6
 #define AUTO_SPAN 0.03
@@ -45,6 +47,7 @@ struct work {
     const struct gn_program *program;
     struct gn_source *source;
     enum gn_exposure_unit unit;
+    int most;           // exposures
     const char *folder; // where pictures are written; NULL: nowhere
     int n_frames;
     int full_scale; // that was asked for; 0: the format's
@@ -69,16 +72,16 @@ static double take_unit(const char **at)
     return 0;
 }
 
-static int refuse_list(const char *text, struct gn_error *out_error)
+static int refuse_list(const char *text, int most, struct gn_error *out_error)
 {
     return gn_error_set(out_error, -EINVAL,
                         "--exposures %.80s: right would be up to %d times above 0 with a unit, as "
                         "1,2,4,8ms or 1/60,1/30s, counts without one, or auto",
-                        text, GN_SERIES_MAX);
+                        text, most);
 }
 
 /* "1,2,4ms": a number without a unit has that of the next one; none at all are counts. */
-static int read_plan(const char *text, struct plan *out, struct gn_error *out_error)
+static int read_plan(const char *text, int most, struct plan *out, struct gn_error *out_error)
 {
     double unit_us = 0;
     int n_plain = 0; // numbers at the end that have no unit yet
@@ -88,11 +91,11 @@ static int read_plan(const char *text, struct plan *out, struct gn_error *out_er
         at += strspn(at, ", ");
         if (!*at)
             break;
-        if (out->n == GN_SERIES_MAX || !gn_calibrate_take_number(&at, &value) || !(value > 0))
-            return refuse_list(text, out_error);
+        if (out->n == most || !gn_calibrate_take_number(&at, &value) || !(value > 0))
+            return refuse_list(text, most, out_error);
         unit_us = take_unit(&at);
         if (*at && !strchr(", ", *at))
-            return refuse_list(text, out_error);
+            return refuse_list(text, most, out_error);
         out->values[out->n++] = value;
         n_plain++;
         for (; unit_us > 0 && n_plain > 0; n_plain--)
@@ -101,7 +104,7 @@ static int read_plan(const char *text, struct plan *out, struct gn_error *out_er
     if (n_plain == out->n && n_plain > 0)
         out->unit = GN_EXPOSURE_COUNTS;
     else if (n_plain > 0 || (out->n == 0 && !out->is_auto))
-        return refuse_list(text, out_error);
+        return refuse_list(text, most, out_error);
     return 0;
 }
 
@@ -169,20 +172,56 @@ static int keep(struct work *w, const struct gn_calibrate_mean *mean, double val
     return err;
 }
 
+static uint64_t count_reopened(const struct work *w)
+{
+    struct gn_source_counts counts;
+    gn_source_get_counts(w->source, &counts);
+    return counts.n_reopened;
+}
+
+static int take_once(const struct work *w, double asked, double *out_value,
+                     struct gn_calibrate_mean *mean, struct gn_error *out_error)
+{
+    int err = gn_source_set_exposure(w->source, asked, out_value, out_error);
+    if (!err && !(*out_value > 0 && isfinite(*out_value)))
+        err = gn_error_set(out_error, -EIO,
+                           "the camera says that it took %g %s where %g were set; an exposure is "
+                           "above 0",
+                           *out_value, get_unit(w), asked);
+    if (!err)
+        err = settle(w, *out_value, out_error);
+    return err ? err
+               : gn_calibrate_mean_take(w->program, w->source, w->n_frames, w->full_scale, mean,
+                                        out_error);
+}
+
+/* The mean of pictures of which each has the exposure: a camera that was lost meanwhile may have
+ * forgotten it. Returns how many times it was begun, or a negative errno. */
+static int take(const struct work *w, double asked, double *out_value,
+                struct gn_calibrate_mean *mean, struct gn_error *out_error)
+{
+    for (int i = 1; i <= MAX_TRIES; i++) {
+        uint64_t n_reopened = count_reopened(w);
+        int err = take_once(w, asked, out_value, mean, out_error);
+        if (err)
+            return err;
+        if (count_reopened(w) == n_reopened)
+            return i;
+        gn_calibrate_mean_finish(mean);
+    }
+    return gn_error_set(out_error, -EIO, "the camera was lost and came back in each of %d tries",
+                        MAX_TRIES);
+}
+
 /* One exposure. least_span: a picture whose codes span less is not kept. */
 static int shoot(struct work *w, double asked, double least_span, double *out_clipped,
                  struct gn_error *out_error)
 {
     struct gn_calibrate_mean mean = {0};
     double value = 0, span = 0;
-    int err = gn_source_set_exposure(w->source, asked, &value, out_error);
-    if (!err)
-        err = settle(w, value, out_error);
-    if (!err)
-        err = gn_calibrate_mean_take(w->program, w->source, w->n_frames, w->full_scale, &mean,
-                                     out_error);
-    if (err)
-        return err;
+    int err = 0, n_tries = take(w, asked, &value, &mean, out_error);
+    if (n_tries < 0)
+        return n_tries;
     gn_calibrate_mean_describe(&mean, &span, out_clipped);
     printf("%g %s", value, get_unit(w));
     if (fabs(value - asked) > 1e-6 * asked)
@@ -190,6 +229,8 @@ static int shoot(struct work *w, double asked, double least_span, double *out_cl
     if (w->n_frames > 1)
         printf(": mean of %d, noise %.2f codes of %d, level steady to %.2f", w->n_frames,
                mean.noise, mean.full_scale, mean.unsteadiness);
+    if (n_tries > 1)
+        printf("; taken %d times, as the camera was lost", n_tries);
     printf("; %.1f %% clipped%s\n", 100 * *out_clipped,
            span < least_span ? "; too dark, left out" : "");
     fflush(stdout);
@@ -208,8 +249,7 @@ static int shoot_doubling(struct work *w, const struct gn_exposure *range,
     int err = shoot(w, fmin(fmax(range->now, range->least), range->most), 0, &clipped, out_error);
     clipped = 0;
     for (double value = fmax(range->least, 1);
-         !err && value <= most && clipped < AUTO_CLIPPED && w->series->n < GN_SERIES_MAX;
-         value *= 2)
+         !err && value <= most && clipped < AUTO_CLIPPED && w->series->n < w->most; value *= 2)
         err = shoot(w, value, AUTO_SPAN, &clipped, out_error);
     return err;
 }
@@ -260,10 +300,13 @@ static int expose(struct work *w, struct plan *plan, struct gn_error *out_error)
                      "interrupted after %d exposures; the result's file is as it was",
                      w->series->n);
     int err_back = gn_source_restore_exposure(w->source, &why);
+    struct gn_error back = {0};
+    if (err_back)
+        gn_error_set(&back, err_back, "the camera's settings are not all put back: %s", why.text);
     if (err_back && err)
-        gn_cmd_fail(w->program, why.text);
+        gn_cmd_fail(w->program, back.text);
     else if (err_back)
-        err = gn_error_set(out_error, err_back, "%s", why.text);
+        err = gn_error_set(out_error, err_back, "%s", back.text);
     return err;
 }
 
@@ -293,7 +336,7 @@ static int write_times(const struct work *w, struct gn_error *out_error)
 }
 
 int gn_calibrate_series_take(struct gn_calibrate_series *series, const struct gn_program *program,
-                             const struct gn_options *options, bool is_8_bit,
+                             const struct gn_options *options, bool is_8_bit, int most,
                              struct gn_error *out_error)
 {
     struct plan plan;
@@ -302,10 +345,12 @@ int gn_calibrate_series_take(struct gn_calibrate_series *series, const struct gn
                      .folder = gn_options_get_string(options, NULL, NULL, "keep"),
                      .n_frames = DEFAULT_FRAMES,
                      .full_scale = gn_options_get_int(options, NULL, NULL, "full-scale"),
+                     .most = most,
                      .is_8_bit = is_8_bit};
     if (gn_options_is_set(options, NULL, NULL, "frames"))
         w.n_frames = (int)gn_options_get_int(options, NULL, NULL, "frames");
-    int err = read_plan(gn_options_get_string(options, NULL, NULL, "exposures"), &plan, out_error);
+    int err =
+        read_plan(gn_options_get_string(options, NULL, NULL, "exposures"), most, &plan, out_error);
     series->taken = calloc(GN_SERIES_MAX, sizeof(*series->taken));
     if (!err && !series->taken)
         err = gn_error_set(out_error, -ENOMEM, "out of memory");

@@ -20,8 +20,8 @@ GN_MUST_USE int gn_calibrate_chart(const struct gn_options *options,
                                    const struct gn_calibrate_series *series,
                                    struct gn_error *out_error);
 
-/** From any still scene in 8 bits, which it takes out of the series; writes --out and --radiance.
- */
+/** From any still scene in 8 bits, at most GN_STACK_MAX_PICTURES, which it takes out of the series;
+ * writes --out and --radiance. */
 GN_MUST_USE int gn_calibrate_stack(const struct gn_options *options,
                                    struct gn_calibrate_series *series, struct gn_error *out_error);
 

@@ -55,13 +55,14 @@ GN_MUST_USE int gn_calibrate_series_list(struct gn_calibrate_series *series, con
 
 /**
  * Takes the pictures from the camera that the options name, and says on stdout how far it is.
- * is_8_bit: 8 bits are what is wanted. The camera's exposure and what was automatic are put back
- * whatever happens. Returns 0, or a negative errno and a sentence: -EINTR on Ctrl-C, -ENOTSUP where
- * the exposure cannot be set. The caller finishes *series in any case.
+ * is_8_bit: 8 bits are what is wanted; most: exposures, [1, GN_SERIES_MAX]. The camera's exposure
+ * and what was automatic are put back whatever happens. Returns 0, or a negative errno and a
+ * sentence: -EINTR on Ctrl-C, -ENOTSUP where the exposure cannot be set. The caller finishes
+ * *series in any case.
  */
 GN_MUST_USE int gn_calibrate_series_take(struct gn_calibrate_series *series,
                                          const struct gn_program *program,
-                                         const struct gn_options *options, bool is_8_bit,
+                                         const struct gn_options *options, bool is_8_bit, int most,
                                          struct gn_error *out_error);
 
 /** Picture k as gn_calibrate_read has it. The caller finishes *out_image. */

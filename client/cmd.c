@@ -180,8 +180,11 @@ static void on_signal(int number)
 
 void gn_cmd_catch_signals(void)
 {
-    struct sigaction action = {.sa_handler = on_signal};
+    struct sigaction action = {.sa_handler = on_signal}, was = {.sa_handler = SIG_DFL};
     sigemptyset(&action.sa_mask);
+    // The terminal was closed; nohup has it ignored.
+    if (sigaction(SIGHUP, NULL, &was) == 0 && was.sa_handler != SIG_IGN)
+        sigaction(SIGHUP, &action, NULL);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);

@@ -111,7 +111,7 @@ GN_MUST_USE int gn_cmd_take_event(const struct gn_client_event *event, struct gn
 void gn_cmd_make_response(const struct gn_response *response, struct gn_msg_response *out);
 void gn_cmd_make_transform(const struct gn_pose *pose, struct gn_msg_transform *out);
 
-/** From now on Ctrl-C and SIGTERM only set what gn_cmd_is_interrupted tells. */
+/** From now on Ctrl-C, SIGTERM and SIGHUP only set what gn_cmd_is_interrupted tells. */
 void gn_cmd_catch_signals(void);
 bool gn_cmd_is_interrupted(void);
 

@@ -189,12 +189,12 @@ static int calibrate(const struct gn_options *options, struct gn_calibrate_serie
     series->format = (struct gn_calibrate_format){
         .full_scale16 = gn_options_get_int(options, NULL, NULL, "full-scale"),
         .bayer = gn_options_get_string(options, NULL, NULL, "bayer")};
+    int most = has_stack ? GN_STACK_MAX_PICTURES : GN_CHART_MAX_SHOTS;
     if (is_live)
-        err = gn_calibrate_series_take(series, &program, options, has_stack, out_error);
+        err = gn_calibrate_series_take(series, &program, options, has_stack, most, out_error);
     else
         err = gn_calibrate_series_list(
-            series, gn_options_get_string(options, NULL, NULL, has_stack ? "stack" : "chart"),
-            has_stack ? GN_STACK_MAX_PICTURES : GN_CHART_MAX_SHOTS,
+            series, gn_options_get_string(options, NULL, NULL, has_stack ? "stack" : "chart"), most,
             gn_options_get_string(options, NULL, NULL, "times"), out_error);
     if (err)
         return err;

@@ -140,14 +140,14 @@ def test_intrinsics():
             assert 'pictures are there already' in err, err
 
 
-def interrupt_at(start, arguments):
-    """Ctrl-C at the line that begins so."""
+def interrupt_at(start, arguments, number=signal.SIGINT):
+    """A signal, Ctrl-C's for example, at the line that begins so."""
     process = subprocess.Popen([GNOMON, 'calibrate', *map(str, arguments)], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     for line in process.stdout:
         if line.startswith(start):
             break
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, err = process.communicate(timeout=60)
     return process, err
 
@@ -208,8 +208,8 @@ A, B, C = .55, .05, 2e-4
 CURVE = ['--response', 'log:%g,%g,%g' % (A, B, C), '--noise', '2']
 
 
-def response(folder, *more, pixels='RGB12'):
-    return ['response', '--gige', '127.0.0.1', '--frame-rate', 100, '--pixel-format', pixels, '--out',
+def response(folder, *more, pixels='RGB12', rate=100):
+    return ['response', '--gige', '127.0.0.1', '--frame-rate', rate, '--pixel-format', pixels, '--out',
             folder.at('probe.json'), *more]
 
 
@@ -269,18 +269,22 @@ def test_response_ends():
     with Folder() as f:
         f.write('light.png', light_picture(draw_chart))
         with Camera(f.at('light.png'), 0, '--chunks', *CURVE) as camera:
-            for _ in range(TRIES):
-                process, err = interrupt_at('exposure 2 of 3', response(
-                    f, '--exposures', '10,20,40ms', '--frames', 50, '--controls', 'GainAuto=Continuous'))
-                if NO_ANSWER not in err:
-                    break
-            assert process.returncode == 1 and 'interrupted after' in read_end(err), (process.returncode, err)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                for _ in range(TRIES):
+                    process, err = interrupt_at('exposure 2 of 3', response(
+                        f, '--exposures', '10,20,40ms', '--frames', 50, '--controls', 'GainAuto=Continuous'),
+                        number)
+                    if NO_ANSWER not in err:
+                        break
+                assert process.returncode == 1 and 'interrupted after' in read_end(err), (process.returncode, err)
             for exposures, words in (('10,20000ms', '2e+07 us is not in [10, 1e+07] us'),
                                      ('1,2,4', 'its exposure is set by times, not by counts'),
                                      ('1ms,2', 'as 1,2,4,8ms'), ('1,2parsecs', 'as 1,2,4,8ms'),
                                      ('0ms', 'as 1,2,4,8ms')):
                 err = run(*response(f, '--exposures', exposures), status=1)
                 assert words in err, (exposures, err)
+            err = run(*response(f, '--live', 'stack', '--exposures', 33 * '1,' + '1ms'), status=1)
+            assert 'right would be up to 32 times' in err, err
         assert camera.get_settings() == (10000, 2), camera.said
         for more, words in (([], 'a camera needs --exposures'),
                             (['--exposures', '1ms', '--times', '1'], 'no --times'),
@@ -291,6 +295,30 @@ def test_response_ends():
         err = run('response', '--chart', 'x', '--keep', 'y', '--out', f.at('probe.json'), status=1)
         assert '--keep are for cameras' in err, err
         assert os.listdir(f.path) == ['light.png']
+
+
+def test_camera_comes_back():
+    """Gone in the middle of an exposure, and back with its own: not a picture of that counts."""
+    with Folder() as f:
+        f.write('light.png', light_picture(draw_chart))
+        with Camera(f.at('light.png'), 0, *CURVE):
+            process = subprocess.Popen(
+                [GNOMON, 'calibrate', *map(str, response(
+                    f, '--exposures', '10,100ms', '--frames', 30, '--controls',
+                    'GainAuto=Continuous', rate=15))], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            head = ''
+            for line in process.stdout:
+                head += line
+                if line.startswith('exposure 1 of 2'):
+                    break
+            time.sleep(1.2)  # into the second
+        with Camera(f.at('light.png'), 0, *CURVE) as camera:
+            out, err = process.communicate(timeout=100)
+        assert process.returncode == 0, (process.returncode, err)
+        assert 'back' in err, err
+        steady = [float(codes) for codes in re.findall(r'level steady to ([\d.]+)', head + out)]
+        assert len(steady) == 2 and max(steady) < 5, out
+        assert camera.get_settings() == (10000, 2), camera.said
 
 
 def test_probe_sees_marker():
@@ -326,7 +354,7 @@ def test_misuse():
 
 def main():
     tests = [test_intrinsics, test_interrupt, test_probe, test_probe_sees_marker, test_chart, test_stack,
-             test_response_ends, test_misuse]
+             test_camera_comes_back, test_response_ends, test_misuse]
     print('1..%d' % len(tests))
     failed = 0
     for number, test in enumerate(tests, 1):
