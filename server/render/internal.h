@@ -199,7 +199,7 @@ struct frame {
     float origin[3];             // the camera, world
     const float *rays;           // [h][w][3] of pixel centres, camera frame; z 0: none
     bool has_real, has_virtual;
-    enum gn_rt_set seen; // by the camera
+    enum gn_rt_set seen;              // by the camera
     struct box real_box, virtual_box; // the virtual one widened against rounding
     struct box solid_box;             // the same of real clusters that are not flat
     const struct box *blockers;       // [n_blockers] real objects, exact

@@ -22,7 +22,7 @@ struct gn_pace {
     uint64_t used;       // the frame that used it last
     struct gn_budget budget;
     bool no_virtual, no_shadow; // its last frame: what was spared is not to be learnt from
-    int n_wanted; // lights of each probe for its last frame; 0: all there can be
+    int n_wanted;               // lights of each probe for its last frame; 0: all there can be
     // Of the last frames of this setting and size, by view and part of the pixels.
     struct gn_budget_setting setting;
     int width, height;

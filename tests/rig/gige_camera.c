@@ -72,8 +72,8 @@ struct camera {
     int n_files;
     struct gn_image16 *files;
     struct gn_rig_curve response; // NONE: the files are codes
-    struct gn_image16 exposed; // what the response makes of a file
-    uint32_t exposure_us[2];   // of the next picture, and of the one after
+    struct gn_image16 exposed;    // what the response makes of a file
+    uint32_t exposure_us[2];      // of the next picture, and of the one after
     uint64_t random;
     int control, stream; // sockets
     struct sockaddr_in to;
@@ -559,8 +559,8 @@ static int serve(const struct gn_options *options, const char *genicam, struct g
     const char *response = gn_options_get_string(options, NULL, NULL, "response");
     int err = 0;
     if (response && !gn_rig_read_curve(response, &c.response))
-        err = gn_error_set(error, -EINVAL, "--response %s: right would be log:A,B,C, srgb or linear",
-                           response);
+        err = gn_error_set(error, -EINVAL,
+                           "--response %s: right would be log:A,B,C, srgb or linear", response);
     if (!err)
         err = open_sockets(&c, gn_options_get_string(options, NULL, NULL, "address"), error);
     if (!err)

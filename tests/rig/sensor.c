@@ -44,8 +44,8 @@ bool gn_rig_read_curve(const char *text, struct gn_rig_curve *out_curve)
         out_curve->type = GN_RIG_CURVE_LINEAR;
     else if (strcmp(text, "srgb") == 0)
         out_curve->type = GN_RIG_CURVE_SRGB;
-    else if (sscanf(text, "log:%lf,%lf,%lf%c", &s->a, &s->b, &s->c, &rest) == 3 &&
-             isfinite(s->a) && isfinite(s->b) && s->b > 0 && isfinite(s->c) && s->c >= 0)
+    else if (sscanf(text, "log:%lf,%lf,%lf%c", &s->a, &s->b, &s->c, &rest) == 3 && isfinite(s->a) &&
+             isfinite(s->b) && s->b > 0 && isfinite(s->c) && s->c >= 0)
         out_curve->type = GN_RIG_CURVE_LOG;
     return out_curve->type != GN_RIG_CURVE_NONE;
 }
