@@ -14,8 +14,13 @@ enum {
     SEARCH_INTERVAL = 15,
 };
 
-/** Least time between two looks for small markers, ns. */
-static const int64_t small_interval_ns = 100 * 1000 * 1000;
+/** Least times between two searches of the whole picture and two looks for small markers, ns: soon
+ * after a marker was seen, and later. */
+static const struct interval {
+    int64_t whole_ns, small_ns;
+} soon = {0, INT64_C(100000000)}, later = {INT64_C(150000000), INT64_C(300000000)};
+/** How long that is soon after, ns. */
+static const int64_t soon_ns = INT64_C(500000000);
 
 /** A marker of the last picture. */
 struct followed {
@@ -31,7 +36,8 @@ struct gn_watch {
     struct gn_search_finds finds;
     int since_whole; // pictures since all of one was searched
     bool with_small; // in this picture
-    int64_t last_small_ns;
+    bool was_ever_seen;
+    int64_t last_seen_ns, last_whole_ns, last_small_ns;
     struct gn_marker_window window;
     int n_last;
     struct followed last[GN_SEARCH_MAX_FOUND], next[GN_SEARCH_MAX_FOUND];
@@ -162,25 +168,34 @@ static bool follow(struct gn_watch *w, const struct gn_grey *grey)
     return w->n_last > 0;
 }
 
-/** Whether it is time to look for small markers. */
-static bool is_small_due(struct gn_watch *w, int64_t time_ns)
+/** Whether so much time has passed since the last one; it has where time does not go on. */
+static bool is_due(int64_t time_ns, int64_t last_ns, int64_t interval_ns)
 {
-    int64_t since_ns = time_ns - w->last_small_ns;
+    return time_ns <= last_ns || time_ns - last_ns >= interval_ns;
+}
+
+/** Whether it is time to search; notes in with_small whether for small markers too. */
+static bool is_search_due(struct gn_watch *w, int64_t time_ns)
+{
     bool is_first = w->counts.n_searched_whole == 0;
-    if (!is_first && since_ns >= 0 && since_ns < small_interval_ns)
-        return false;
-    w->last_small_ns = time_ns;
-    return true;
+    bool is_soon =
+        w->n_last > 0 || (w->was_ever_seen && !is_due(time_ns, w->last_seen_ns, soon_ns));
+    const struct interval *least = is_soon ? &soon : &later;
+    w->with_small = is_first || is_due(time_ns, w->last_small_ns, least->small_ns);
+    if (w->with_small)
+        w->last_small_ns = time_ns;
+    return w->with_small || is_due(time_ns, w->last_whole_ns, least->whole_ns);
 }
 
 /** Searches near where the last picture had markers, and everywhere where that finds fewer. */
-static int search_again(struct gn_watch *w, const struct gn_grey *grey, bool is_near,
-                        struct gn_error *out_error)
+static int search_again(struct gn_watch *w, const struct gn_grey *grey, int64_t time_ns,
+                        bool is_near, struct gn_error *out_error)
 {
     int err = is_near ? search(w, grey, &w->window, out_error) : 0;
     if (err || (is_near && w->finds.n_found >= w->n_last))
         return err;
     w->since_whole = 0;
+    w->last_whole_ns = time_ns;
     w->strangers.n_ids = 0;
     w->counts.n_searched_whole++;
     return search(w, grey, NULL, out_error);
@@ -228,16 +243,18 @@ int gn_watch_update(struct gn_watch *w, const struct gn_grey *grey, int64_t time
     w->since_whole++;
     if (is_near && follow(w, grey)) {
         w->counts.n_followed++;
-    } else {
-        w->with_small = is_small_due(w, time_ns);
-        err = search_again(w, grey, is_near, out_error);
+    } else if (is_search_due(w, time_ns)) {
+        err = search_again(w, grey, time_ns, is_near, out_error);
         if (!err && w->with_small && w->finds.n_found == 0)
             err = look_for_others(w, grey, out_error);
     }
     if (err)
         w->finds.n_found = 0;
-    if (w->finds.n_found > 0)
+    if (w->finds.n_found > 0) {
         gn_foreign_destroy(&w->foreign);
+        w->was_ever_seen = true;
+        w->last_seen_ns = time_ns;
+    }
     remember(w);
     return err;
 }

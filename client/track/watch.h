@@ -28,8 +28,10 @@ GN_MUST_USE int gn_watch_create(const struct gn_camera *camera, const struct gn_
 void gn_watch_destroy(struct gn_watch **watch);
 
 /**
- * Looks at the next picture of the camera's, taken at time_ns. Small markers are searched for
- * once in 100 ms at most. Returns 0, or a negative errno and a sentence.
+ * Looks at the next picture of the camera's, taken at time_ns. Where a marker was in sight in the
+ * last half second each picture is searched, for small markers once in 100 ms; later it is once in
+ * 150 ms, for small ones once in 300 ms, so that each is found again in a third of a second.
+ * Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_watch_update(struct gn_watch *watch, const struct gn_grey *grey, int64_t time_ns,
                                 struct gn_error *out_error);

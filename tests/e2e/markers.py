@@ -265,7 +265,7 @@ def test_markers_that_are_not_as_listed_are_told():
             status, out, err = gnomon(
                 'track', server(daemon), '--object', 'cube', '--files', desk.at('shots'),
                 '--camera', desk.at('camera.json'), '--markers',
-                desk.write('wrong.json', json.dumps(markers)), '--rate', '50')
+                desk.write('wrong.json', json.dumps(markers)), '--rate', '15')
             lines = [line for line in err.splitlines() if 'wrong.json' in line]
             assert len(lines) == bool(words), (words, err)
             assert not words or re.search(words, lines[0]), (words, lines)

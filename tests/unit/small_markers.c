@@ -1,12 +1,13 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
-/* Markers of so few pixels that their cells run into each other: found, read and placed. */
+/* Markers of so few pixels that their cells run into each other: found, read and placed; lost and
+ * found again. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/track/search.h"
+#include "client/track/watch.h"
 #include "tests/unit/cmocka_setup.h"
 
 enum { WIDTH = 160, HEIGHT = 120, MAX_SIDE = GN_MARKER_MAX_CELLS };
@@ -169,6 +170,69 @@ static void at_the_border_too(void **state)
     assert_int_equal(finds.n_found, 1);
 }
 
+/** The marker for three pictures, none for so many, and then again. Returns for how long, s, it was
+ * in sight before it was seen; out_n: how many of the empty pictures were searched. */
+static double lose_and_find(const uint8_t *with, const uint8_t *without, double rate_hz,
+                            int n_without, int *out_n)
+{
+    static struct gn_bodies bodies;
+    struct gn_watch *watch = NULL;
+    struct gn_watch_counts counts, before = {0};
+    const struct gn_grey seen = get_grey(with), empty = get_grey(without);
+    assert_int_equal(gn_bodies_read_text("apriltag_36h11:33:0.05", &bodies, NULL), 0);
+    assert_int_equal(gn_watch_create(&camera, &bodies, &watch, NULL), 0);
+    int i = 0, n_seen = 0;
+    for (; i < 3 + n_without; i++) {
+        assert_int_equal(
+            gn_watch_update(watch, i < 3 ? &seen : &empty, llround(1e9 * i / rate_hz), NULL), 0);
+        (void)gn_watch_get_sightings(watch, &n_seen);
+        assert_int_equal(n_seen, i < 3);
+        gn_watch_get_counts(watch, i < 3 ? &before : &counts);
+    }
+    int n_late = 0;
+    for (; n_seen == 0 && n_late < rate_hz; i++, n_late++) {
+        assert_int_equal(gn_watch_update(watch, &seen, llround(1e9 * i / rate_hz), NULL), 0);
+        (void)gn_watch_get_sightings(watch, &n_seen);
+    }
+    *out_n = (int)(counts.n_searched_whole - before.n_searched_whole);
+    gn_watch_destroy(&watch);
+    gn_bodies_finish(&bodies);
+    return (n_late - 1) / rate_hz;
+}
+
+static void lost_ones_are_found_in_a_third_of_a_second(void **state)
+{
+    (void)state;
+    static const double rates_hz[] = {15, 24, 25, 30, 60};
+    static const struct place places[2] = {{72.9, 59.8, 4, 0.9, 0.95},
+                                           {72.9, 59.8, 1.35, 0.9, 0.95}};
+    static uint8_t shots[2][WIDTH * HEIGHT], empty[WIDTH * HEIGHT];
+    static const struct place nowhere = {-100, -100, 1, 0, 1};
+    uint8_t white[MAX_SIDE * MAX_SIDE];
+    int cells = gn_marker_get_cells(gn_marker_find_dictionary("apriltag_36h11", 14), 33, white), n;
+    shoot(&nowhere, white, cells, empty);
+    for (int k = 0; k < 2; k++) {
+        double longest_s = 0;
+        shoot(&places[k], white, cells, shots[k]);
+        for (size_t i = 0; i < GN_ARRAY_LEN(rates_hz); i++) {
+            int n_second = (int)rates_hz[i];
+            for (int phase = 0; phase < 10; phase++) {
+                double s = lose_and_find(shots[k], empty, rates_hz[i], n_second + phase, &n);
+                longest_s = fmax(longest_s, s);
+                // All for half a second, then at most 7 in one.
+                assert_true(n <= 0.5 * rates_hz[i] + 2 + 7 * (0.5 + phase / rates_hz[i]));
+            }
+            // Soon after it was lost each picture is searched.
+            double s = lose_and_find(shots[k], empty, rates_hz[i], n_second / 3, &n);
+            assert_int_equal(n, n_second / 3);
+            assert_true(s == 0 || (k == 1 && s <= 0.134));
+        }
+        print_message("# cells of %.1f px: seen again after %.3f s at most\n", places[k].cell,
+                      longest_s);
+        assert_true(longest_s <= (k == 1 ? 0.3334 : 0.2001));
+    }
+}
+
 int main(void)
 {
     if (!gn_vision_is_built()) {
@@ -180,6 +244,7 @@ int main(void)
         cmocka_unit_test(smallest_by_a_closer_look),
         cmocka_unit_test(only_ids_that_are_looked_for),
         cmocka_unit_test(at_the_border_too),
+        cmocka_unit_test(lost_ones_are_found_in_a_third_of_a_second),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
