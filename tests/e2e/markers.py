@@ -188,6 +188,19 @@ def test_a_short_text_and_steady_poses():
             assert off[0] < 0.003, (off, line)
 
 
+def test_a_recording_gives_the_same_poses_each_time():
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
+        give_light(daemon, desk)
+        said = []
+        for _ in range(2):
+            succeed('view', server(daemon), '--files', desk.at('shots'), '--loop', '--count', '18',
+                    '--rate', '100', '--camera', desk.at('camera.json'), '--markers',
+                    desk.at('markers.json'), '--out', desk.at('out'))
+            with open(desk.at('out/poses.jsonl')) as lines:
+                said.append(lines.read())
+        assert said[0] == said[1] and said[0].count('\n') == 18, said
+
+
 def test_an_object_follows_its_markers():
     with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk, Viewer(daemon) as viewer, \
             Client(daemon, pb.ROLE_TRACKER) as hand:
@@ -314,5 +327,5 @@ def test_what_is_wrong_is_said():
 
 
 run_tests([test_each_frame_has_the_pose_of_its_own_picture, test_a_short_text_and_steady_poses,
-           test_an_object_follows_its_markers, test_markers_that_are_not_as_listed_are_told,
-           test_what_is_wrong_is_said])
+           test_a_recording_gives_the_same_poses_each_time, test_an_object_follows_its_markers,
+           test_markers_that_are_not_as_listed_are_told, test_what_is_wrong_is_said])
