@@ -80,6 +80,17 @@ static int64_t get_end_ns(struct gn_gige *s, ArvBuffer *buffer)
                                now_ns - age_ns);
 }
 
+/** The middle of the exposure; its end where that would be before the picture before it, which was
+ * over by then: an exposure time that was just set holds from a later picture on, or is a lie. */
+static int64_t get_middle_ns(struct gn_gige *s, ArvBuffer *buffer, double said_us)
+{
+    double exposure_us = said_us > 0 ? said_us : s->device.exposure_us;
+    int64_t end_ns = get_end_ns(s, buffer);
+    int64_t middle_ns = end_ns - (int64_t)(500 * fmin(fmax(exposure_us, 0), MAX_EXPOSURE_US));
+    s->given_ns = middle_ns > s->given_ns ? middle_ns : end_ns;
+    return s->given_ns;
+}
+
 /** Pictures between the last and this of which not a packet came. Ids count up from 1, those of 16
  * bits begin again after 65535 (GigE Vision 2.0, 24). */
 static uint64_t count_gap(struct gn_gige *s, uint64_t id)
@@ -136,11 +147,9 @@ static void take_buffer(struct gn_gige *s, ArvBuffer *buffer)
 {
     bool is_good = is_whole(s, buffer);
     struct gn_gige_picture p = {.buffer = buffer};
-    if (is_good) { // its time is the middle of the exposure
+    if (is_good) {
         p.exposure_us = gn_gige_device_get_exposure(&s->device, buffer);
-        double exposure_us = p.exposure_us > 0 ? p.exposure_us : s->device.exposure_us;
-        p.time_ns =
-            get_end_ns(s, buffer) - (int64_t)(500 * fmin(fmax(exposure_us, 0), MAX_EXPOSURE_US));
+        p.time_ns = get_middle_ns(s, buffer, p.exposure_us);
     }
     uint64_t n_lost = count_gap(s, arv_buffer_get_frame_id(buffer));
     if (!s->has_begun)

@@ -48,9 +48,12 @@
 /** Frames kept for sending again. */
 #define N_KEPT 8
 #define MAX_FILES 4096
+/** Commands that are answered before the next picture is sent. */
+#define MAX_COMMANDS 64
 /** Some faults begin after so many frames. */
 #define N_FAULTLESS 20
 #define DIM_US 600000
+#define LONG_US 10000000
 
 /** A frame that was sent and may be asked for again. */
 struct frame {
@@ -239,6 +242,8 @@ static void send_frame(struct camera *c)
     uint32_t exposure_us = has_response
                                ? c->exposure_us[0]
                                : read_register(c, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+    if (c->fault == FAULT_EXPOSURE && c->n_frames % 2)
+        exposure_us = LONG_US;
     if (picture && has_response)
         picture = expose(c, picture);
     gn_gige_pack(format, picture, c->n_frames, width, height, f->data);

@@ -19,7 +19,8 @@ enum fault {
     FAULT_DROP,
     FAULT_CHANGE,
     FAULT_SILENT,
-    FAULT_DIM
+    FAULT_DIM,
+    FAULT_EXPOSURE
 };
 
 /** The program and its options. */
