@@ -103,21 +103,20 @@ int gn_gige_exposure_restore(struct gn_gige_device *device, const char *id,
                              struct gn_gige_noted *noted, struct gn_error *out_error)
 {
     GError *error = NULL;
-    const char *what = "its exposure time cannot be put back";
     int first = 0;
-    if (noted->is_held && noted->exposure_us > 0)
+    if (noted->exposure_us > 0) {
         arv_camera_set_exposure_time(device->camera, noted->exposure_us, &error);
-    for (size_t i = 0; noted->is_held && i <= GN_ARRAY_LEN(automatics); i++) {
-        if (error && !first)
-            first = refuse(out_error, id, what, &error);
-        g_clear_error(&error);
-        if (i == GN_ARRAY_LEN(automatics) || !noted->automatics[i][0])
-            continue;
-        what = automatics[i];
-        arv_camera_set_string(device->camera, automatics[i], noted->automatics[i], &error);
-    }
-    if (!first && noted->is_held)
         device->exposure_us = noted->exposure_us;
+    }
+    if (error)
+        first = refuse(out_error, id, "its exposure time cannot be put back", &error);
+    for (size_t i = 0; i < GN_ARRAY_LEN(automatics); i++) {
+        if (noted->automatics[i][0])
+            arv_camera_set_string(device->camera, automatics[i], noted->automatics[i], &error);
+        if (error && !first)
+            first = refuse(out_error, id, automatics[i], &error);
+        g_clear_error(&error);
+    }
     memset(noted, 0, sizeof(*noted));
     return first;
 }

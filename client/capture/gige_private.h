@@ -56,6 +56,7 @@ struct gn_gige {
     int n_bad;                   // pictures in a row that were not whole
     int64_t whole_ns;            // when the last whole one came, or the opening was
     struct gn_gige_noted noted;  // of the exposure, while it is held
+    double asked_us;             // options.exposure_us, likewise
     int64_t given_ns;            // the last whole picture's time
     struct gn_thread undertaker; // closes what does not answer any more, which takes seconds
     struct gn_gige_device dead;

@@ -266,6 +266,7 @@ static bool answer_setting(struct gn_gige *s)
     gn_mutex_unlock(&s->mu);
     if (!asked)
         return false;
+    bool was_held = s->noted.is_held;
     if (asked->what == GN_GIGE_HOLD)
         asked->err = gn_gige_exposure_hold(&s->device, s->id, asked->unit, &s->noted, &asked->range,
                                            &asked->error);
@@ -274,8 +275,12 @@ static bool answer_setting(struct gn_gige *s)
             gn_gige_exposure_set(&s->device, s->id, asked->value, &asked->range.now, &asked->error);
     else
         asked->err = gn_gige_exposure_restore(&s->device, s->id, &s->noted, &asked->error);
-    if (asked->what == GN_GIGE_SET && !asked->err)
+    if (asked->what == GN_GIGE_HOLD && !asked->err)
+        s->asked_us = s->options.exposure_us;
+    else if (asked->what == GN_GIGE_SET && !asked->err)
         s->options.exposure_us = asked->range.now; // what it has when it was lost and is back
+    else if (asked->what == GN_GIGE_RESTORE && was_held)
+        s->options.exposure_us = s->asked_us;
     gn_mutex_lock(&s->mu);
     asked->is_done = true;
     gn_cond_signal(&s->answered);

@@ -33,6 +33,7 @@ struct v4l2_source {
     int64_t frame_ns; // 0: unknown
     struct gn_v4l2_stream stream;
     struct gn_v4l2_exposure exposure;
+    double asked_us;      // options.exposure_us while the exposure is held
     bool has_picture;     // one has come since this opening
     int64_t last_ns;      // when, or of the opening
     int64_t given_ns;     // the last picture's time
@@ -304,7 +305,11 @@ static int v4l2_hold_exposure(struct gn_source *source, enum gn_exposure_unit un
 {
     struct v4l2_source *s = (struct v4l2_source *)source;
     int err = check_there(s, out_error);
-    return err ? err : gn_v4l2_exposure_hold(&s->device, unit, &s->exposure, out, out_error);
+    if (!err)
+        err = gn_v4l2_exposure_hold(&s->device, unit, &s->exposure, out, out_error);
+    if (!err)
+        s->asked_us = s->options.exposure_us;
+    return err;
 }
 
 static int v4l2_set_exposure(struct gn_source *source, double value, double *out_value,
@@ -325,7 +330,10 @@ static int v4l2_restore_exposure(struct gn_source *source, struct gn_error *out_
     if (s->exposure.n_noted == 0)
         return 0;
     int err = check_there(s, out_error);
-    return err ? err : gn_v4l2_exposure_restore(&s->device, &s->exposure, out_error);
+    if (err)
+        return err;
+    s->options.exposure_us = s->asked_us;
+    return gn_v4l2_exposure_restore(&s->device, &s->exposure, out_error);
 }
 
 static void v4l2_close(struct gn_source *source)
