@@ -161,7 +161,7 @@ static void set_rate(ArvCamera *camera, double rate_hz, GError **error)
     g_free(selector);
 }
 
-/** Rate, exposure and gain: set where asked for, read where it says. */
+/** Rate, exposure and gain, where asked for. */
 static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *place,
                         const struct gn_live_options *options, struct gn_error *out_error)
 {
@@ -186,8 +186,6 @@ static int set_exposure(struct gn_gige_device *d, const struct gn_gige_place *pl
         set_rate(c, options->frame_rate_hz, &error);
     if (error)
         return set_arv_error(out_error, -EINVAL, place, "cannot set --frame-rate", &error);
-    d->frame_rate_hz = arv_camera_get_frame_rate(c, NULL); // 0: it does not say
-    gn_gige_device_read_exposure(d);
     return 0;
 }
 
@@ -346,7 +344,9 @@ int gn_gige_device_open(struct gn_gige_place *place, const struct gn_live_option
         err = read_format(&d, place, out_error);
     if (!err)
         err = set_size(&d, place, options, out_error);
-    if (!err) {
+    if (!err) { // what it has come to, --controls and all
+        d.frame_rate_hz = arv_camera_get_frame_rate(d.camera, NULL);
+        gn_gige_device_read_exposure(&d);
         d.is_triggered = waits_for_triggers(device);
         set_chunks(&d);
         err = start_stream(&d, place, out_error);

@@ -304,7 +304,11 @@ def test_silence():
             _, err = lamp.interrupt()
         assert ': back\n' in err and err.count('not a packet') == 1, err
         with Camera(*size(), '--fault', 'dim'):
-            lamp = probe(daemon, folder, '--frame-rate', '50', '--count', '24')
+            lamp = probe(daemon, folder, '--frame-rate', '20', '--count', '24')
+            assert lamp.end()[1] == ''
+        with Camera(*size()):  # slower than --frame-rate by what has the last word
+            lamp = probe(daemon, folder, '--frame-rate', '50', '--controls',
+                         'AcquisitionFrameRate=3', '--count', '4')
             assert lamp.end()[1] == ''
 
 
