@@ -82,7 +82,7 @@ int gn_gige_place_find(const char *id, struct gn_gige_place *out_place, struct g
     for (unsigned i = 0; i < n; i++) {
         const char *device_id = arv_interface_get_device_id(gv, i);
         const char *address = arv_interface_get_device_address(gv, i);
-        if (strcmp(id, "any") == 0 || is_same(device_id, id) || is_same(address, id) ||
+        if (strcmp(id, "any") == 0 || is_same(device_id, id) ||
             is_same(arv_interface_get_device_physical_id(gv, i), id) ||
             is_same(arv_interface_get_device_serial_nbr(gv, i), id)) {
             memset(out_place, 0, sizeof(*out_place));
