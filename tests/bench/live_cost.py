@@ -29,7 +29,7 @@ from gnomond import Daemon, Room  # noqa: E402
 from pictures import exr_bytes  # noqa: E402
 
 GNOMON, FAKE, MAKE_SHOTS, RECORDED = sys.argv[3:7]
-N = int(sys.argv[7]) if len(sys.argv) > 7 else 100
+N = int(sys.argv[7]) if len(sys.argv) > 7 else 45
 WARM_UP = 10
 LIMIT_MS = 5
 MARKER = '6x6_250:0:0.08'
