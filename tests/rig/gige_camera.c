@@ -82,6 +82,7 @@ struct camera {
     struct sockaddr_in to;
     struct sockaddr_in controller; // port 0: nobody
     int64_t heard_ns;              // of the controller
+    int64_t looked_ns;             // when its heartbeat was last looked for
     bool is_streaming;
     int64_t next_ns, begin_ns;
     uint64_t n_frames;
@@ -351,19 +352,20 @@ static void answer(struct camera *c, const uint8_t *command, size_t n,
     (void)!sendto(c->control, out, 8 + n_out, 0, (const struct sockaddr *)from, sizeof(*from));
 }
 
-/** Answers a command, if one comes in time. */
+/** Answers a command, if one comes in time, and those that wait behind it: a camera that is behind
+ * with its pictures must not fall behind with what is lost of them. */
 static void answer_waiting(struct camera *c, int timeout_ms)
 {
     struct pollfd wait = {.fd = c->control, .events = POLLIN};
-    uint8_t command[2048];
-    struct sockaddr_in from = {0};
-    socklen_t length = sizeof(from);
-    if (poll(&wait, 1, timeout_ms) < 1)
-        return;
-    ssize_t n =
-        recvfrom(c->control, command, sizeof(command), 0, (struct sockaddr *)&from, &length);
-    if (n >= 8 && command[0] == 0x42)
-        answer(c, command, (size_t)n, &from);
+    for (int i = 0; i < MAX_COMMANDS && poll(&wait, 1, i ? 0 : timeout_ms) == 1; i++) {
+        uint8_t command[2048];
+        struct sockaddr_in from = {0};
+        socklen_t length = sizeof(from);
+        ssize_t n =
+            recvfrom(c->control, command, sizeof(command), 0, (struct sockaddr *)&from, &length);
+        if (n >= 8 && command[0] == 0x42)
+            answer(c, command, (size_t)n, &from);
+    }
 }
 
 /** Frees a dead controller's hold, and begins or ends the stream. */
@@ -371,6 +373,9 @@ static void look_after_stream(struct camera *c)
 {
     int64_t now_ns = gn_clock_get_monotonic_ns();
     int64_t heartbeat_ns = read_register(c, REG_HEARTBEAT_MS) * GN_NS_PER_MS;
+    if (now_ns - c->looked_ns > GN_NS_PER_S) // where the machine stood still the client did, too
+        c->heard_ns += now_ns - c->looked_ns;
+    c->looked_ns = now_ns;
     if (c->controller.sin_port && now_ns - c->heard_ns > heartbeat_ns) {
         c->controller = (struct sockaddr_in){0};
         arv_fake_camera_set_control_channel_privilege(c->fake, 0);
