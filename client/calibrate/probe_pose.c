@@ -273,7 +273,7 @@ static double count_repeats(const struct problem *p)
 static int refuse(const struct problem *p, const struct gn_probe_pose *out,
                   struct gn_error *out_error)
 {
-    if (2 * out->n_used <= p->n && p->n > 2)
+    if (2 * out->n_used <= p->n)
         return gn_error_set(out_error, -EDOM,
                             "only %d of %d sightings of markers fit one place of the probe: did "
                             "the probe or a marker move between pictures, are size and position "
@@ -333,15 +333,16 @@ static int fit(const struct problem *p, struct gn_pose *guesses, int n_guesses, 
     }
     int n_residuals = 8 * out->n_used;
     double found = sum / fmax(n_residuals - UNKNOWNS, 1);
-    double mean = 0;
+    // What corners are off by may be the same in all pictures of a marker.
+    double unit2 = fmax(found, 1) * count_repeats(p), mean = 0;
     for (int i = 0; i < p->n; i++) {
         p->s[i].rms_rad = sqrt(get_mean_square(&pose, &p->s[i]));
         mean += p->s[i].is_used ? p->s[i].rms_rad * p->s[i].rms_rad / out->n_used : 0;
     }
     out->world_from_probe = pose;
     out->rms_rad = sqrt(mean);
-    out->margin = (other - sum) / fmax(found, count_repeats(p));
-    if (judge(p, fmax(found, count_repeats(p)), out) < 0)
+    out->margin = (other - sum) / unit2;
+    if (judge(p, unit2, out) < 0)
         return gn_error_set(out_error, -EDOM, "the markers' corners determine no pose");
     return refuse(p, out, out_error);
 }

@@ -46,7 +46,7 @@ struct gn_probe_pose {
  * each to where most sightings agree (least squares with Cauchy's weights, narrowing), leaves out
  * sightings that are off by five times the rest, and ends with plain least squares by Gauss-Newton
  * and QR. Errors follow from the Jacobian and what the corners are off, but not less than
- * error_rad, which pictures of one marker have in common: more pictures do not lower it.
+ * error_rad; pictures of one marker are taken to have that in common: more of them do not lower it.
  * n in [1, GN_PROBE_POSE_MAX_SIGHTINGS]. Returns 0; -EDOM and a sentence where sightings disagree,
  * two poses fit, or the answer is more uncertain than the bounds above (*out has the figures then,
  * too; n_used 0: none); -ENOSYS (no OpenCV), -ENOMEM.

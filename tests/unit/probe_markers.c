@@ -255,6 +255,12 @@ static void test_pictures_agree(void **unused)
     // More pictures of the same markers do not make the answer surer than one of each does.
     assert_int_equal(gn_probe_pose_fit(s, 2, &single, &e), 0);
     assert_true(pose.error_rad > 0.7 * single.error_rad && pose.error_rad < 1.3 * single.error_rad);
+    // Nor where corners are off by more than their edges, each time the same.
+    for (int i = 0; i < 12; i++)
+        see(&truth, i % 2 ? OTHER_ID : ID, 0.12, 3, &s[i]);
+    assert_int_equal(gn_probe_pose_fit(s, 12, &pose, &e), 0);
+    assert_int_equal(gn_probe_pose_fit(s, 2, &single, &e), 0);
+    assert_true(pose.error_rad > 0.7 * single.error_rad && pose.error_rad < 1.3 * single.error_rad);
 }
 
 static void refuse(struct gn_probe_sighting *s, int n, const char *words)
@@ -281,6 +287,9 @@ static void test_refusals(void **unused)
     for (int k = 0; k < 4; k++)
         s[1].corners_world[k][0] += 0.03; // the other one is not where it is said to be
     refuse(s, 2, "degrees off their places");
+    for (int k = 0; k < 4; k++)
+        s[1].corners_world[k][0] += 0.27; // so far from there that either marker fits without it
+    refuse(s, 2, "only 1 of 2 sightings");
     for (int i = 0; i < 12; i++) { // it moves after half of the pictures, again and again
         struct gn_pose moved = place_probe(0.5, 0.6, 1 + 0.6 * fmax(i - 5, 0), 0.9, 2);
         see(&moved, ID, 0.02, i, &s[i]);
