@@ -100,6 +100,11 @@ static int find_levels(const struct plane *p, float levels[LEVELS])
     return 0;
 }
 
+static double get_square(double x, double y)
+{
+    return x * x + y * y;
+}
+
 /* Takes a region if it is one of the sought kind; of several about one place the largest stays. */
 static void add_region(struct regions *r, const double sum[6])
 {
@@ -112,7 +117,7 @@ static void add_region(struct regions *r, const double sum[6])
         return;
     for (int i = 0; i < r->n; i++) {
         struct region *old = &r->list[i];
-        if (hypot(old->x - x, old->y - y) < 0.3 * sqrt(fmin(n, old->area))) {
+        if (get_square(old->x - x, old->y - y) < 0.3 * 0.3 * fmin(n, old->area)) {
             if (n > old->area)
                 *old = (struct region){x, y, n};
             return;
@@ -209,17 +214,18 @@ static int fit_grid(const struct regions *r, struct grid *g)
 /* The region next to where the grid expects a node; -1: none near enough, or of another size. */
 static int find_node(const struct regions *r, const struct grid *g, double u, double v, double area)
 {
-    double at[2], right[2], below[2], best = INFINITY;
+    double at[2], right[2], below[2];
     int found = -1;
     map_point(g->h, u, v, at);
     map_point(g->h, u + 1, v, right);
     map_point(g->h, u, v + 1, below);
-    double step =
-        fmin(hypot(right[0] - at[0], right[1] - at[1]), hypot(below[0] - at[0], below[1] - at[1]));
+    double step_square = fmin(get_square(right[0] - at[0], right[1] - at[1]),
+                              get_square(below[0] - at[0], below[1] - at[1]));
+    double best = NEAR * NEAR * step_square; // squared, as this loop is where the time goes
     for (int i = 0; i < r->n; i++) {
-        double d = hypot(r->list[i].x - at[0], r->list[i].y - at[1]) / step;
+        double d = get_square(r->list[i].x - at[0], r->list[i].y - at[1]);
         double ratio = r->list[i].area / area;
-        if (d < NEAR && d < best && ratio > 0.4 && ratio < 2.5) {
+        if (d < best && ratio > 0.4 && ratio < 2.5) {
             best = d;
             found = i;
         }
