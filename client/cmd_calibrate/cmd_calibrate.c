@@ -19,11 +19,11 @@ static const struct {
     {"print", gn_cmd_calibrate_print,
      "the board or marker that is looked for, to be printed (SVG)"},
     {"intrinsics", gn_cmd_calibrate_intrinsics,
-     "the lens of a camera, from pictures of a chessboard or ChArUco board"},
+     "a camera's lens, from pictures of a chessboard or ChArUco board"},
     {"response", gn_cmd_calibrate_response,
-     "codes to light, from a colour chart at several exposures or an exposure stack"},
+     "codes to light, from a colour chart at several exposures or a stack"},
     {"probe", gn_cmd_calibrate_probe,
-     "where a fisheye looks, from lamps of known direction; a mirror ball's place"},
+     "where a fisheye looks, from markers or lamps; a mirror ball's place"},
 };
 
 static void print_help(FILE *out)

@@ -241,9 +241,6 @@ static int calibrate(struct run *run, const struct gn_options *options, struct g
     if (!gn_vision_is_built())
         return gn_feature_refuse(GN_FEATURE_VISION, out_error);
     int err = read_board(options, &run->set.board, out_error);
-    const char *misuse = find_misuse(options);
-    if (!err && misuse)
-        err = gn_error_set(out_error, -EINVAL, "%s", misuse);
     if (!err)
         err = gn_calibrate_is_live(options) ? collect(run, options, out_error)
                                             : look_all(run, options, out_error);
@@ -271,6 +268,12 @@ int gn_cmd_calibrate_intrinsics(int argc, char *const argv[])
     int ret = gn_cmd_load(&program, argc, argv, &options);
     if (ret <= 0)
         return ret == 0 ? 0 : 2;
+    const char *misuse = find_misuse(options);
+    if (misuse) {
+        gn_cmd_fail(&program, misuse);
+        gn_options_destroy(&options);
+        return 2;
+    }
     struct run *run = calloc(1, sizeof(*run));
     ret = run ? calibrate(run, options, &error) : gn_error_set(&error, -ENOMEM, "out of memory");
     if (run)

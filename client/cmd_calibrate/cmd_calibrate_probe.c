@@ -241,18 +241,27 @@ static const char *find_misuse(const struct gn_probe_run *run)
         return "nothing to find: give --find-circle, --ball, --lamps or --markers";
     if (has_circle && has_ball)
         return "--find-circle is for fisheyes, --ball for balls";
+    if (!has_ball && gn_probe_run_has(run, "camera-share"))
+        return "--camera-share is for --ball";
     const char *misuse = gn_calibrate_find_misuse(run->options);
     if (!misuse && gn_probe_run_has(run, "frames") && !gn_calibrate_is_live(run->options))
         misuse = "--frames is for cameras and videos; of files all are taken";
-    return misuse ? misuse : gn_probe_run_find_marker_misuse(run);
+    if (!misuse)
+        misuse = gn_probe_run_find_marker_misuse(run);
+    if (!misuse && !has_lamps &&
+        (gn_options_get_set(run->options, NULL, NULL, "fit") != 0 ||
+         !gn_options_is_default(run->options, NULL, NULL, "share") ||
+         !gn_options_is_default(run->options, NULL, NULL, "tolerance")))
+        misuse = "--fit, --share and --tolerance are for --lamps";
+    return misuse;
 }
 
 static int measure(struct gn_probe_run *run, struct gn_error *out_error)
 {
     bool has_lamps = gn_probe_run_has(run, "lamps");
     bool has_markers = gn_probe_run_has(run, "markers") || gn_probe_run_has(run, "marker");
-    const char *reason = find_misuse(run);
-    int err = reason ? gn_error_set(out_error, -EINVAL, "%s", reason) : read_setup(run, out_error);
+    const char *reason = NULL;
+    int err = read_setup(run, out_error);
     if (!err && has_lamps)
         err = gn_probe_run_read_lamps(run, out_error);
     if (!err && has_markers)
@@ -299,10 +308,12 @@ int gn_cmd_calibrate_probe(int argc, char *const argv[])
     if (ret <= 0)
         return ret == 0 ? 0 : 2;
     struct gn_probe_run *run = calloc(1, sizeof(*run));
+    const char *misuse = NULL;
     if (run) {
         run->program = &program;
         run->options = options;
-        ret = calibrate(run, &error);
+        misuse = find_misuse(run);
+        ret = misuse ? gn_error_set(&error, -EINVAL, "%s", misuse) : calibrate(run, &error);
         gn_image_finish(&run->first);
         gn_image_finish(&run->first_light);
         gn_image_finish(&run->live);
@@ -313,5 +324,7 @@ int gn_cmd_calibrate_probe(int argc, char *const argv[])
     }
     free(run);
     gn_options_destroy(&options);
-    return ret ? gn_cmd_fail(&program, error.text) : 0;
+    if (ret)
+        gn_cmd_fail(&program, error.text);
+    return misuse ? 2 : ret ? 1 : 0;
 }

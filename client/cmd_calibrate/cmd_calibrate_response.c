@@ -170,21 +170,31 @@ static const char *find_misuse(const struct gn_options *options)
     if (!n_cameras && (has(options, "live") || has(options, "exposures") ||
                        has(options, "frames") || has(options, "keep")))
         return "--live, --exposures, --frames and --keep are for cameras, and none is named";
+    if (!n_cameras && !has(options, "times") && is_stack(options))
+        return "--stack needs --times";
+    if (!n_cameras && !has(options, "times") &&
+        gn_options_get_enum(options, NULL, NULL, "model") == GN_CURVE_LINEAR)
+        return "--model linear needs --times";
     return NULL;
+}
+
+static int check_options(const struct gn_options *options, struct gn_error *out_error)
+{
+    const char *misuse = find_misuse(options), *ignored = find_ignored(options);
+    if (misuse)
+        return gn_error_set(out_error, -EINVAL, "%s", misuse);
+    if (ignored)
+        return gn_error_set(out_error, -EINVAL, "--%s is for %s", ignored,
+                            is_stack(options) ? "charts, not for a stack"
+                                              : "stacks, not for a chart");
+    return 0;
 }
 
 static int calibrate(const struct gn_options *options, struct gn_calibrate_series *series,
                      struct gn_error *out_error)
 {
-    const char *misuse = find_misuse(options);
-    if (misuse)
-        return gn_error_set(out_error, -EINVAL, "%s", misuse);
     bool is_live = gn_live_count_asked(options) > 0;
     bool has_stack = is_stack(options);
-    const char *ignored = find_ignored(options);
-    if (ignored)
-        return gn_error_set(out_error, -EINVAL, "--%s is for %s", ignored,
-                            has_stack ? "charts, not for a stack" : "stacks, not for a chart");
     int err;
     series->format = (struct gn_calibrate_format){
         .full_scale16 = gn_options_get_int(options, NULL, NULL, "full-scale"),
@@ -212,8 +222,11 @@ int gn_cmd_calibrate_response(int argc, char *const argv[])
     int ret = gn_cmd_load(&program, argc, argv, &options);
     if (ret <= 0)
         return ret == 0 ? 0 : 2;
-    ret = calibrate(options, &series, &error);
+    int misused = check_options(options, &error);
+    ret = misused ? misused : calibrate(options, &series, &error);
     gn_calibrate_series_finish(&series);
     gn_options_destroy(&options);
-    return ret ? gn_cmd_fail(&program, error.text) : 0;
+    if (ret)
+        gn_cmd_fail(&program, error.text);
+    return misused ? 2 : ret ? 1 : 0;
 }

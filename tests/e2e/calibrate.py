@@ -39,10 +39,10 @@ def succeed(*arguments):
     return out
 
 
-def refuse(words, *arguments):
-    """One line that says what is wrong, status 1, no traceback of any sort."""
-    status, out, err = calibrate(*arguments)
-    assert status in (1, 2), (arguments, status, out, err)
+def refuse(words, *arguments, status=1):
+    """One line that says what is wrong, no traceback of any sort. status: 2 for misuse."""
+    got, out, err = calibrate(*arguments)
+    assert got == status, (arguments, got, out, err)
     assert err.count('\n') == 1 and words in err, (words, err)
 
 
@@ -127,7 +127,7 @@ def check_chart():
                '--corners', '0,0,9', '--out', f.at('x.json'))
         refuse('number 2 is none', 'response', '--chart', f.at('chart*.png'), '--times', '1,two',
                '--out', f.at('x.json'))
-        refuse('one of them', 'response', '--out', f.at('x.json'))
+        refuse('one of them', 'response', '--out', f.at('x.json'), status=2)
         f.write('bad.json', b'{"width": 0, "fx": 1}')
         refuse('bad.json', 'response', '--chart', f.at('chart*.png'), '--times', listed, '--full-scale', 4095,
                '--corners', CORNERS, '--out', f.at('bad.json'))
@@ -172,11 +172,12 @@ def check_stack():
                       '--out', f.at('probe.json'))
         assert float(re.search(r'off the table by ([\d.]+) %', out).group(1)) < 2, out
         assert json.load(open(f.at('probe.json')))['response'] == {'type': 'srgb'}
-        refuse('needs --times', 'response', '--stack', f.at('s*.png'), '--out', f.at('x.json'))
+        refuse('needs --times', 'response', '--stack', f.at('s*.png'), '--out', f.at('x.json'), status=2)
         for option, words in ((['--plot', 'x'], '--plot is for charts'), (['--model', 'linear'], '--model is for charts')):
             refuse(words, 'response', '--stack', f.at('s*.png'), '--times', f.at('times.txt'), *option, '--out',
-                   f.at('x.json'))
-        refuse('--as is for stacks', 'response', '--chart', f.at('s*.png'), '--as', 'srgb', '--out', f.at('x.json'))
+                   f.at('x.json'), status=2)
+        refuse('--as is for stacks', 'response', '--chart', f.at('s*.png'), '--as', 'srgb', '--out', f.at('x.json'),
+               status=2)
         refuse('codes fall', 'response', '--stack', f.at('s*.png'), '--times',
                ','.join(map(str, times[::-1])), '--out', f.at('x.json'))
 
@@ -235,7 +236,7 @@ def check_probe():
         f.write('zero.txt', b'p0.png 0 0 0\n')
         refuse('line 1: right would be', 'probe', '--files', f.at('p0.png'), '--lamps', f.at('zero.txt'),
                '--out', f.at('probe.json'))
-        refuse('nothing to find', 'probe', '--files', f.at('p0.png'), '--out', f.at('probe.json'))
+        refuse('nothing to find', 'probe', '--files', f.at('p0.png'), '--out', f.at('probe.json'), status=2)
         refuse('says no projection', 'probe', '--files', f.at('p0.png'), '--find-circle', '--out',
                f.at('new.json'))
         assert json.load(open(f.at('probe.json'))) == setup

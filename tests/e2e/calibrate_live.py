@@ -187,7 +187,7 @@ def test_probe():
         assert math.dist(found['center'], (122.4, 88.2)) < .5, found
         assert abs(found['radius'] / math.sin(found['theta_max'] / 2) - 60.6) < .5, found
         err = run('probe', '--files', f.at('a.png'), '--frames', 2, '--ball', '118,92,57', '--out',
-                  f.at('probe.json'), status=1)
+                  f.at('probe.json'), status=2)
         assert '--frames is for cameras' in err, err
 
 
@@ -290,9 +290,9 @@ def test_response_ends():
                             (['--exposures', '1ms', '--times', '1'], 'no --times'),
                             (['--exposures', '1ms', '--chart', 'x'], 'one of them'),
                             (['--exposures', '1ms', '--bayer', 'rggb'], '--bayer is for files')):
-            err = run(*response(f, *more), status=1)
+            err = run(*response(f, *more), status=2)
             assert words in err, (more, err)
-        err = run('response', '--chart', 'x', '--keep', 'y', '--out', f.at('probe.json'), status=1)
+        err = run('response', '--chart', 'x', '--keep', 'y', '--out', f.at('probe.json'), status=2)
         assert '--keep are for cameras' in err, err
         assert os.listdir(f.path) == ['light.png']
 
@@ -342,12 +342,12 @@ def test_probe_sees_marker():
 def test_misuse():
     """Sources that are none, several, or not for this."""
     with Folder() as f:
-        for arguments, words in (
-                ([], 'one of them'), (['--files', 'x', '--gige', 'any'], 'one of them'),
-                (['--files', 'x', '--keep', 'y'], '--views and --keep'),
-                (['--files', 'x', '--gain', '1'], 'are for cameras'),
-                (['--gige', '127.0.0.1'], 'no GigE Vision camera answers')):
-            err = run('intrinsics', *arguments, *BOARD, '--out', f.at('camera.json'), status=1)
+        for status, arguments, words in (
+                (2, [], 'one of them'), (2, ['--files', 'x', '--gige', 'any'], 'one of them'),
+                (2, ['--files', 'x', '--keep', 'y'], '--views and --keep'),
+                (2, ['--files', 'x', '--gain', '1'], 'are for cameras'),
+                (1, ['--gige', '127.0.0.1'], 'no GigE Vision camera answers')):
+            err = run('intrinsics', *arguments, *BOARD, '--out', f.at('camera.json'), status=status)
             assert words in err, (arguments, err)
         assert os.listdir(f.path) == []
 

@@ -80,13 +80,17 @@ def check_options(command, wanted):
 
 
 def check_program():
-    """gnomon itself: each command once, with a summary."""
+    """gnomon itself and gnomon calibrate: each command once, with a summary."""
     text = ask(GNOMON, '--help')
     check_shape(text)
-    for command in ('probe', 'screen', 'track', 'view', 'calibrate', 'doctor'):
+    for command in ('probe', 'screen', 'track', 'view', 'calibrate', 'replay', 'doctor'):
         assert len(re.findall(r'^  %s +\S' % command, text, re.M)) == 1, text
     assert ask(GNOMON, 'help') == ask(GNOMON, '-h') == text
     assert re.fullmatch(r'gnomon \d+\.\d+\.\d+\n', ask(GNOMON, '--version'))
+    text = ask(GNOMON, 'calibrate', '--help')
+    check_shape(text)
+    for command in ('print', 'intrinsics', 'response', 'probe'):
+        assert len(re.findall(r'^  %s +\S' % command, text, re.M)) == 1, text
 
 
 def main():
