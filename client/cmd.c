@@ -73,6 +73,12 @@ static int record(const struct gn_cmd_link *link, const struct gn_client_options
                                       client_options, client, out_error);
 }
 
+static bool is_given_up(void *ctx)
+{
+    const struct gn_cmd_link *link = ctx;
+    return gn_cmd_is_interrupted() || (link->is_given_up && atomic_load(link->is_given_up));
+}
+
 int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
                       struct gn_error *out_error)
 {
@@ -96,9 +102,13 @@ int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_cli
         .want_lighting_maps = link->wants_maps,
         .want_statistics = link->wants_statistics,
         .timeout_ms = link->timeout_ms,
+        .is_given_up = is_given_up,
+        .ctx = (void *)(uintptr_t)link,
     };
     struct gn_wire_fault why = {{0}};
     int err = gn_client_connect(&client_options, out_client, &why);
+    if (err == -EINTR)
+        return gn_error_set(out_error, err, "%s: interrupted before it answered", text);
     if (err && strstr(why.text, server.host))
         return gn_error_set(out_error, err, "%s%s", why.text, get_hint(err));
     if (err)

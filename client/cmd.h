@@ -6,6 +6,7 @@
 #ifndef GN_CLIENT_CMD_H
 #define GN_CLIENT_CMD_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -78,12 +79,14 @@ struct gn_cmd_link {
     bool wants_light; // LIGHTING_STATE
     bool wants_maps;  // ... with maps
     bool wants_statistics;
-    const char *room;        // where --room is not given, default the server's first
-    const char *client_name; // default the program's
-    int timeout_ms;          // of each step, > 0, default 5000
+    const char *room;               // where --room is not given, default the server's first
+    const char *client_name;        // default the program's
+    int timeout_ms;                 // of each step, > 0, default 5000
+    const atomic_bool *is_given_up; // atomic: connecting ends as by Ctrl-C; default NULL
 };
 /** Connects, synchronises the clock, and records as --record says, if the command has that. Returns
- * 0, or a negative errno and a sentence. Thread-safety: safe. */
+ * 0, -EINTR (Ctrl-C before there was an answer), or another negative errno, and a sentence.
+ * Thread-safety: safe. */
 GN_MUST_USE int gn_cmd_connect_as(const struct gn_cmd_link *link, struct gn_client **out_client,
                                   struct gn_error *out_error);
 

@@ -238,9 +238,10 @@ static int run(struct track *t, const struct gn_options *options)
         r->clock_ns = gn_client_now_ns();
         rc = send_all(t, &error);
     }
-    bool is_done = rc == 0 || (rc == -EINTR && !t->poses && r->n_wanted == 0); // an orbit's end
+    // An orbit's end.
+    bool is_done = rc == 0 || (rc == -EINTR && r->client && !t->poses && r->n_wanted == 0);
     if (!is_done)
-        gn_cmd_fail(&program, rc == -EINTR ? "interrupted" : error.text);
+        gn_cmd_fail(&program, rc == -EINTR && r->client ? "interrupted" : error.text);
     if (r->client && (is_done || rc == -EINTR)) {
         printf("%ld poses sent", r->n_sent);
         gn_feed_print_shift(r);

@@ -11,7 +11,8 @@
 struct gn_redial {
     struct gn_cmd_link link;
     struct gn_thread thread;
-    atomic_bool is_done; // atomic: release in run(), acquire in gn_redial_is_done()
+    atomic_bool is_done;     // atomic: release in run(), acquire in gn_redial_is_done()
+    atomic_bool is_given_up; // atomic: set by the owner, read by the thread
     // owner: the thread, until it is joined
     struct gn_client *client;
     struct gn_error error;
@@ -33,6 +34,7 @@ int gn_redial_start(const struct gn_cmd_link *link, struct gn_redial **out_redia
     if (!r)
         return gn_error_set(out_error, -ENOMEM, "out of memory");
     r->link = *link;
+    r->link.is_given_up = &r->is_given_up;
     int err = gn_thread_start(&r->thread, "gn-redial", run, r);
     if (err) {
         free(r);
@@ -45,6 +47,11 @@ int gn_redial_start(const struct gn_cmd_link *link, struct gn_redial **out_redia
 bool gn_redial_is_done(const struct gn_redial *redial)
 {
     return atomic_load_explicit(&redial->is_done, memory_order_acquire);
+}
+
+void gn_redial_give_up(struct gn_redial *redial)
+{
+    atomic_store(&redial->is_given_up, true);
 }
 
 int gn_redial_finish(struct gn_redial **redial, struct gn_client **out_client,

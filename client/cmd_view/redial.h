@@ -21,6 +21,9 @@ GN_MUST_USE int gn_redial_start(const struct gn_cmd_link *link, struct gn_redial
 /** Has it come to an end, one way or the other? Does not wait. */
 bool gn_redial_is_done(const struct gn_redial *redial);
 
+/** It is not wanted any more: it ends soon, with -EINTR unless it had an answer already. */
+void gn_redial_give_up(struct gn_redial *redial);
+
 /** Waits for the end and nulls *redial. Returns as gn_cmd_connect. */
 GN_MUST_USE int gn_redial_finish(struct gn_redial **redial, struct gn_client **out_client,
                                  struct gn_error *out_error);

@@ -58,6 +58,8 @@ static int dial(struct gn_viewer *v, struct gn_error *out_error)
     if (err)
         return err;
     int interrupted = pause_until(v, 0, redial);
+    if (interrupted)
+        gn_redial_give_up(redial);
     err = gn_redial_finish(&redial, &v->feed.client, out_error);
     if (interrupted)
         gn_client_destroy(&v->feed.client);

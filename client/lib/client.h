@@ -29,6 +29,8 @@ struct gn_client {
     struct gn_msg_welcome welcome;
     struct gn_wire_fault fault;
     int timeout_ms;
+    bool (*is_given_up)(void *ctx); // NULL: nobody is asked, as once connected
+    void *is_given_up_ctx;
     int lost;                // the errno that ended the connection, 0 while it is good
     int64_t last_sent_ns;    // own clock
     int64_t offset_ns;       // server minus own clock
@@ -50,6 +52,11 @@ int gn_client_lose(struct gn_client *client, int err, const char *text);
 
 /** Own monotonic clock, ns; timeout_ms < 0: never. */
 int64_t gn_client_get_deadline(int timeout_ms);
+
+/** Wait for a socket. Returns 1 ready, 0 deadline passed, -EINTR (given up), or another negative
+ * errno. */
+GN_MUST_USE int gn_client_wait_fd(const struct gn_client *client, int fd, short events,
+                                  int64_t deadline_ns);
 
 /** Write a whole message, within timeout_ms. payload is not kept. Returns as
  * gn_client_send_frame(). */

@@ -13,31 +13,20 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "common/clock.h"
-
 /** Wait until connecting has succeeded or failed. Returns 0 or a negative errno. */
-static int wait_connected(int fd, int64_t deadline_ns)
+static int wait_connected(const struct gn_client *client, int fd, int64_t deadline_ns)
 {
-    for (;;) {
-        int64_t left = deadline_ns - gn_clock_get_monotonic_ns();
-        if (left <= 0)
-            return -ETIMEDOUT;
-        int64_t ms = left / GN_NS_PER_MS + 1;
-        struct pollfd p = {.fd = fd, .events = POLLOUT};
-        int n = poll(&p, 1, ms > 60000 ? 60000 : (int)ms);
-        if (n < 0 && errno != EINTR)
-            return -errno;
-        if (n <= 0)
-            continue;
-        int err = 0;
-        socklen_t len = sizeof(err);
-        if (getsockopt(fd, SOL_SOCKET, SO_ERROR, &err, &len) < 0)
-            return -errno;
-        return -err;
-    }
+    int err = 0, n = gn_client_wait_fd(client, fd, POLLOUT, deadline_ns);
+    socklen_t len = sizeof(err);
+    if (n <= 0)
+        return n ? n : -ETIMEDOUT;
+    if (getsockopt(fd, SOL_SOCKET, SO_ERROR, &err, &len) < 0)
+        return -errno;
+    return -err;
 }
 
-static int dial_address(const struct addrinfo *address, int64_t deadline_ns, int *out_fd)
+static int dial_address(const struct gn_client *client, const struct addrinfo *address,
+                        int64_t deadline_ns, int *out_fd)
 {
     int fd = socket(address->ai_family, address->ai_socktype, address->ai_protocol);
     if (fd < 0)
@@ -49,7 +38,8 @@ static int dial_address(const struct addrinfo *address, int64_t deadline_ns, int
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on)) < 0)
         err = -errno;
     else if (connect(fd, address->ai_addr, address->ai_addrlen) < 0)
-        err = errno == EINPROGRESS || errno == EINTR ? wait_connected(fd, deadline_ns) : -errno;
+        err = errno == EINPROGRESS || errno == EINTR ? wait_connected(client, fd, deadline_ns)
+                                                     : -errno;
     if (err) {
         close(fd);
         return err;
@@ -58,9 +48,10 @@ static int dial_address(const struct addrinfo *address, int64_t deadline_ns, int
     return 0;
 }
 
-int gn_dial(const char *host, uint16_t port, int64_t deadline_ns, int *out_fd,
-            struct gn_wire_fault *why)
+int gn_dial(struct gn_client *client, const char *host, uint16_t port, int *out_fd)
 {
+    struct gn_wire_fault *why = &client->fault;
+    int64_t deadline_ns = gn_client_get_deadline(client->timeout_ms);
     char service[8];
     snprintf(service, sizeof(service), "%u", port);
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV};
@@ -72,8 +63,8 @@ int gn_dial(const char *host, uint16_t port, int64_t deadline_ns, int *out_fd,
         return -EHOSTUNREACH;
     }
     int err = -EHOSTUNREACH;
-    for (const struct addrinfo *a = addresses; a && err; a = a->ai_next)
-        err = dial_address(a, deadline_ns, out_fd);
+    for (const struct addrinfo *a = addresses; a && err && err != -EINTR; a = a->ai_next)
+        err = dial_address(client, a, deadline_ns, out_fd);
     freeaddrinfo(addresses);
     if (err)
         snprintf(why->text, sizeof(why->text), "%.80s port %u: %s", host, port, strerror(-err));

@@ -6,17 +6,16 @@
 
 #include <stdint.h>
 
+#include "client/lib/client.h"
 #include "proto/attr.h"
-#include "proto/wire.h"
 
 /**
  * Try each address of the host in turn until one answers. The socket is non-blocking, with
- * TCP_NODELAY and close-on-exec. deadline_ns: own monotonic clock; the look-up of the name does not
- * heed it. Returns 0, -EHOSTUNREACH (no such host), -ETIMEDOUT, or the last address's errno; why
- * says host, port and reason. Thread-safety: safe.
+ * TCP_NODELAY and close-on-exec. Within the client's timeout_ms, which the look-up of the name does
+ * not heed. Returns 0, -EHOSTUNREACH (no such host), -ETIMEDOUT, -EINTR (given up), or the last
+ * address's errno; the client's fault says host, port and reason.
  */
-GN_MUST_USE int gn_dial(const char *host, uint16_t port, int64_t deadline_ns, int *out_fd,
-                        struct gn_wire_fault *why);
+GN_MUST_USE int gn_dial(struct gn_client *client, const char *host, uint16_t port, int *out_fd);
 
 void gn_dial_close(int fd);
 

@@ -21,6 +21,8 @@ int gn_client_connect(const struct gn_client_options *opts, struct gn_client **o
     if (!client)
         return gn_client_fail(why, -ENOMEM, "out of memory");
     client->timeout_ms = opts->timeout_ms > 0 ? opts->timeout_ms : DEFAULT_TIMEOUT_MS;
+    client->is_given_up = opts->is_given_up;
+    client->is_given_up_ctx = opts->ctx;
     int err = gn_client_say_hello(client, opts);
     if (err) {
         if (why)
@@ -29,6 +31,7 @@ int gn_client_connect(const struct gn_client_options *opts, struct gn_client **o
         return err;
     }
     client->fault.text[0] = 0;
+    client->is_given_up = NULL;
     *out = client;
     return 0;
 }

@@ -29,6 +29,10 @@ struct gn_client_options {
     int timeout_ms; // for each of: connecting, the answer to HELLO, one send; > 0, default 5000
     const uint8_t *resume_token; // from an earlier welcome, default none
     size_t resume_token_bytes;   // [0, 32]
+    // Asked ten times a second while gn_client_connect() waits, in its thread; true ends it with
+    // -EINTR. Default NULL: it waits for as long as timeout_ms says.
+    bool (*is_given_up)(void *ctx);
+    void *ctx; // for is_given_up
 };
 
 /** What came from the server. Which member of `message` holds is said by `type`. */
@@ -49,7 +53,7 @@ struct gn_client;
  * On failure *out is NULL and why (may be NULL) has one line that says what failed, where and why.
  * Returns 0; -EINVAL (a bad option), -EHOSTUNREACH (no such host), the socket's errno, -ETIMEDOUT,
  * -EACCES (the server said no: its sentence is in why), -EPROTONOSUPPORT (no version in common),
- * -ELOOP (redirected twice), -EPROTO (not our protocol) or -ENOMEM.
+ * -ELOOP (redirected twice), -EPROTO (not our protocol), -EINTR (given up) or -ENOMEM.
  */
 GN_MUST_USE int gn_client_connect(const struct gn_client_options *opts, struct gn_client **out,
                                   struct gn_wire_fault *why);

@@ -11,7 +11,7 @@
 static int open_conn(struct gn_client *client, const char *host, uint16_t port)
 {
     int fd = -1;
-    int err = gn_dial(host, port, gn_client_get_deadline(client->timeout_ms), &fd, &client->fault);
+    int err = gn_dial(client, host, port, &fd);
     if (err)
         return err;
     struct gn_conn_options opts = {.receive = GN_WIRE_TO_CLIENT, .fd = fd};

@@ -10,6 +10,9 @@
 #include "client/lib/client.h"
 #include "common/clock.h"
 
+/** How often who connects is asked whether to go on, ms. */
+#define ASK_MS 100
+
 int gn_client_fail(struct gn_wire_fault *why, int err, const char *format, ...)
 {
     va_list args;
@@ -32,16 +35,19 @@ int64_t gn_client_get_deadline(int timeout_ms)
     return timeout_ms < 0 ? INT64_MAX : gn_clock_get_monotonic_ns() + timeout_ms * GN_NS_PER_MS;
 }
 
-/** Wait for the socket. Returns 1 ready, 0 deadline passed, negative errno. */
-static int wait_fd(int fd, short events, int64_t deadline_ns)
+int gn_client_wait_fd(const struct gn_client *client, int fd, short events, int64_t deadline_ns)
 {
     for (;;) {
+        if (client->is_given_up && client->is_given_up(client->is_given_up_ctx))
+            return -EINTR;
         int64_t left = deadline_ns == INT64_MAX ? -1 : deadline_ns - gn_clock_get_monotonic_ns();
         int ms = -1;
         if (deadline_ns != INT64_MAX) {
             int64_t up = left <= 0 ? 0 : (left + GN_NS_PER_MS - 1) / GN_NS_PER_MS;
             ms = up > 60000 ? 60000 : (int)up;
         }
+        if (client->is_given_up && (ms < 0 || ms > ASK_MS))
+            ms = ASK_MS;
         struct pollfd p = {.fd = fd, .events = events};
         int n = poll(&p, 1, ms);
         if (n > 0)
@@ -63,7 +69,7 @@ static int flush_all(struct gn_client *client)
         client->last_sent_ns = gn_clock_get_monotonic_ns();
         if (n > 0)
             return 0;
-        n = wait_fd(gn_conn_get_fd(client->conn), POLLOUT, deadline);
+        n = gn_client_wait_fd(client, gn_conn_get_fd(client->conn), POLLOUT, deadline);
         if (n == 0)
             return gn_client_lose(client, -ETIMEDOUT, "the server takes no more data");
         if (n < 0)
@@ -139,7 +145,7 @@ int gn_client_receive(struct gn_client *client, int64_t deadline_ns, struct gn_c
             return n;
         if (n < 0)
             return gn_client_lose(client, n, gn_conn_get_fault(client->conn));
-        n = wait_fd(gn_conn_get_fd(client->conn), POLLIN, deadline_ns);
+        n = gn_client_wait_fd(client, gn_conn_get_fd(client->conn), POLLIN, deadline_ns);
         if (n == 0)
             return 0;
         if (n < 0)

@@ -4,6 +4,8 @@
 
 usage: usage.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 """
+import signal
+import socket
 import subprocess
 import sys
 
@@ -117,4 +119,15 @@ def test_values():
     assert done.returncode == 1 and b'standard output' in done.stderr
 
 
-run_tests([test_options, test_values])
+def test_interrupt():
+    """Ctrl-C ends the wait for a server that takes the connection and says nothing."""
+    with socket.create_server(('127.0.0.1', 0)) as mute:
+        run = Run('track', '--object', 'a', '--orbit', '1', '--server', '127.0.0.1:%d' % mute.getsockname()[1])
+        connection, _ = mute.accept()
+        with connection:
+            assert connection.recv(1), 'no HELLO'
+            run.process.send_signal(signal.SIGINT)
+            run.fail(1, 'interrupted before it answered')
+
+
+run_tests([test_options, test_values, test_interrupt])
