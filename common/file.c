@@ -120,6 +120,7 @@ int gn_file_read_text(const char *path, size_t max_bytes, char **out_text, size_
 int gn_file_writer_open(struct gn_file_writer *writer, const char *path, struct gn_error *out_error)
 {
     static atomic_uint counter;
+    struct stat st;
     int r = 0;
     // Its own short name: a name as long as the file system allows has no room for a suffix.
     const char *slash = strrchr(path, '/');
@@ -128,6 +129,12 @@ int gn_file_writer_open(struct gn_file_writer *writer, const char *path, struct 
     *writer = (struct gn_file_writer){.fd = -1, .path = strdup(path), .temp_path = malloc(size)};
     if (!writer->path || !writer->temp_path) {
         r = gn_error_set(out_error, -ENOMEM, "cannot write %s: out of memory", path);
+        goto out;
+    }
+    // Whoever may write there would put a file in the place of a device.
+    if (stat(path, &st) == 0 && !S_ISREG(st.st_mode)) {
+        r = gn_error_set(out_error, S_ISDIR(st.st_mode) ? -EISDIR : -EINVAL,
+                         "cannot write %s: not a regular file", path);
         goto out;
     }
     do {

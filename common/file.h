@@ -39,7 +39,8 @@ struct gn_file_writer {
     char *temp_path; // owned
 };
 
-/** Opens a temporary file beside path. Returns 0 or a negative errno and a sentence. */
+/** Opens a temporary file beside path, where there is nothing yet or a regular file. Returns 0 or a
+ * negative errno and a sentence. */
 GN_MUST_USE int gn_file_writer_open(struct gn_file_writer *writer, const char *path,
                                     struct gn_error *out_error);
 /** Writes n bytes at offset. Returns 0 or a negative errno. */

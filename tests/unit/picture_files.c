@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -247,6 +248,13 @@ static void test_files(void **state)
     assert_int_equal(gn_file_read(path, 5, &data, &size, &error), 0);
     assert_memory_equal(data, "hello", 5);
     free(data);
+    unlink(path);
+    /* What is no file stays what it is. */
+    struct stat st;
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_int_equal(gn_file_write(path, "hello", 5, &error), -EINVAL);
+    assert_non_null(strstr(error.text, "not a regular file"));
+    assert_true(stat(path, &st) == 0 && S_ISFIFO(st.st_mode));
     unlink(path);
 }
 
