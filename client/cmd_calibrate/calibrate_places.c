@@ -15,8 +15,10 @@
 
 #define DEGREE 57.29577951308232
 
-/** Poses closer than this to the middlemost agree, whatever the others do. */
-static const double least_spread = 0.1 / DEGREE;
+/** Poses this many of their errors from the middlemost agree, whatever the others do. */
+static const double least_spread = 3;
+/** An error is taken to be this large at least. */
+static const double least_rad = 0.03 / DEGREE, least_m = 3e-4;
 
 /** The places of one body that the pictures say. */
 struct said {
@@ -80,6 +82,17 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/** How far apart two pictures put the body, turned or moved, in units of their errors. */
+static double get_distance(const struct said *said, int i, int k)
+{
+    const struct gn_pose *a = &said->pose[i], *b = &said->pose[k];
+    double rad = fmax(hypot(said->error_rad[i], said->error_rad[k]), least_rad), apart = 0;
+    double m = fmax(hypot(said->error_m[i], said->error_m[k]), least_m);
+    for (int j = 0; j < 3; j++)
+        apart = hypot(apart, a->translation[j] - b->translation[j]);
+    return fmax(gn_rotation_get_angle(a->rotation, b->rotation) / rad, apart / m);
+}
+
 /** Distances from the pose that is nearest to all others; returns their median. */
 static double get_distances(const struct said *said, double *out_distance)
 {
@@ -88,13 +101,12 @@ static double get_distances(const struct said *said, double *out_distance)
     for (int i = 0; i < said->n; i++) {
         double sum = 0;
         for (int k = 0; k < said->n; k++)
-            sum += gn_rotation_get_angle(said->pose[i].rotation, said->pose[k].rotation);
+            sum += get_distance(said, i, k);
         middle = sum < best ? i : middle;
         best = fmin(best, sum);
     }
     for (int i = 0; i < said->n; i++)
-        sorted[i] = out_distance[i] =
-            gn_rotation_get_angle(said->pose[middle].rotation, said->pose[i].rotation);
+        sorted[i] = out_distance[i] = get_distance(said, middle, i);
     qsort(sorted, (size_t)said->n, sizeof(*sorted), compare_doubles);
     return sorted[(said->n - 1) / 2];
 }

@@ -30,10 +30,11 @@ struct gn_body_place {
 /**
  * Measures the places of all bodies that the pictures (a folder, a file or a pattern) of the camera
  * (camera.json) show together with the body "world", each picture by itself: the mean of the poses
- * that agree, within three times their median distance from the middlemost. Says to standard output
- * what was found. out_places[GN_BODY_MAX_BODIES]. camera_path NULL: the world alone. Returns 0, or
- * a negative errno and a sentence: -EDOM where no picture shows the world and another body, where
- * fewer than half of the poses agree, or one is too uncertain.
+ * that agree, turned and moved from the middlemost by no more than three times their median
+ * distance, or three of their errors. Says to standard output what was found.
+ * out_places[GN_BODY_MAX_BODIES]. camera_path NULL: the world alone. Returns 0, or a negative errno
+ * and a sentence: -EDOM where no picture shows the world and another body, where fewer than half of
+ * the poses agree, or one is too uncertain.
  */
 GN_MUST_USE int gn_places_find(const struct gn_bodies *bodies, const char *camera_path,
                                const char *pattern, struct gn_body_place *out_places,

@@ -4,7 +4,8 @@
  * Photographs of markers through a fisheye for tests: fisheye_shots MARKERS.json DIR writes into
  * DIR near-N.png (a probe that looks past the markers of the first two bodies), up-N.png (one on
  * the table that looks up and sees the second body alone), both in 12-bit log codes with noise, and
- * cam-N.png (a camera that sees both bodies) and moved-0.png (the second one elsewhere); a lamp
+ * cam-N.png (a camera that sees both bodies), slid-0.png and turned-0.png (the second one moved, or
+ * turned in its place); a lamp
  * shines from far; probe.json (response alone) and camera.json. To standard output the true poses,
  * as matrices. The first body lies on the table, the second stands.
  */
@@ -172,10 +173,13 @@ int main(int argc, char *argv[])
           shoot_probe(&fisheye, argv[2], "up", &up) || shoot_camera(argv[2], "cam", SHOTS);
     gn_pose_to_matrix(&standing, m);
     gn_test_print_matrix("standing", m, "}\n");
-    standing.translation[0] += 0.05;
+    struct gn_pose elsewhere = standing;
+    elsewhere.translation[0] += 0.05;
+    gn_pose_to_matrix(&elsewhere, sheets[1].world_from_sheet);
+    err = err || shoot_camera(argv[2], "slid", 1);
     gn_rotation_exp((const double[3]){70 * degree, 0.1, 0.1}, standing.rotation);
     gn_pose_to_matrix(&standing, sheets[1].world_from_sheet);
-    err = err || shoot_camera(argv[2], "moved", 1);
+    err = err || shoot_camera(argv[2], "turned", 1);
     gn_rig_marker_camera_finish(&fisheye);
     gn_bodies_finish(&bodies);
     return err != 0;
