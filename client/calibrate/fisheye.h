@@ -65,6 +65,9 @@ struct gn_fisheye_puzzle {
     int picture;         // that shows the spot
 };
 
+/** An orientation that explains as many spots is taken for worse where it is worse by this RMS. */
+#define GN_FISHEYE_MIN_CONTRAST_DEG 0.5
+
 /** Pairs of spots and lights that are matched. */
 #define GN_FISHEYE_MAX_CANDIDATES 4096
 
@@ -74,8 +77,8 @@ struct gn_fisheye_puzzle {
  * picture's spots near one light, and of lights near one spot, only the nearest counts then: flares
  * stay out. candidates[n]: all pairs of a picture's spots and lights. out_sightings has room for n.
  * n in [0, GN_FISHEYE_MAX_CANDIDATES]. It takes some seconds at most: where pairs are too many, one
- * in *out_stride is tried, else that is 1. Returns how many sightings, or -EDOM, -ENOMEM and a
- * sentence.
+ * in *out_stride is tried, else that is 1. Returns how many sightings; -EDOM and a sentence where
+ * there are not two, or where another orientation explains as many about as well; or -ENOMEM.
  */
 GN_MUST_USE int gn_fisheye_match(const struct gn_projection *projection,
                                  const struct gn_fisheye_puzzle *candidates, int n,

@@ -17,6 +17,8 @@
 static const double max_work = 2e8;
 /** Directions of a pair lie farther apart than this, rad. */
 static const double min_apart = 0.03;
+/** Other orientations that are looked at closely before the best is taken for the only one. */
+static const int max_rivals = 256;
 
 struct match {
     const struct gn_fisheye_puzzle *candidates;
@@ -44,23 +46,38 @@ static bool is_pair(const struct match *m, int i, int k)
            fabs(acos(fmax(of_seen, -1)) - acos(fmin(fmax(of_world, -1), 1))) <= 2 * m->tolerance;
 }
 
-/** Counts what the orientation by two candidates explains. */
-static void try_pair(struct match *m, int i, int k)
+/** The orientation by two candidates. Returns 0 or -EDOM. */
+static int turn_pair(const struct match *m, int i, int k, double out_r[static 9])
 {
-    double b[9] = {0}, r[9], singular[3], error = 0, bound = cos(m->tolerance);
+    double b[9] = {0}, singular[3];
     const int pair[2] = {i, k};
-    int count = 0;
     for (int j = 0; j < 18; j++)
         b[j % 9] += m->candidates[pair[j / 9]].dir_world[j % 9 / 3] * m->seen[pair[j / 9]][j % 3];
-    if (gn_solve_wahba(b, r, singular) < 0)
-        return;
+    return gn_solve_wahba(b, out_r, singular);
+}
+
+/** How many candidates an orientation explains; *out_error: the sum of 1 - cosine. */
+static int count_explained(const struct match *m, const double r[static 9], double *out_error)
+{
+    double bound = cos(m->tolerance);
+    int count = 0;
+    *out_error = 0;
     for (int j = 0; j < m->n; j++) {
         double cosine = get_cosine(m, r, j);
         if (cosine > bound) {
             count++;
-            error += 1 - cosine;
+            *out_error += 1 - cosine;
         }
     }
+    return count;
+}
+
+static void try_pair(struct match *m, int i, int k)
+{
+    double r[9], error;
+    if (turn_pair(m, i, k, r) < 0)
+        return;
+    int count = count_explained(m, r, &error);
     if (count > m->best_count || (count == m->best_count && error < m->best_error)) {
         m->best_count = count;
         m->best_error = error;
@@ -90,12 +107,13 @@ static bool is_rival(const struct gn_fisheye_puzzle *a, const struct gn_fisheye_
             memcmp(a->dir_world, b->dir_world, sizeof(a->dir_world)) == 0);
 }
 
-/** The candidates that the best orientation explains: of rivals the nearest. */
-static int keep_nearest(const struct match *m, struct gn_fisheye_sighting *out)
+/** The candidates that an orientation explains: of rivals the nearest. */
+static int keep_nearest(const struct match *m, const double r[static 9],
+                        struct gn_fisheye_sighting *out)
 {
     int kept = 0;
     for (int i = 0; i < m->n; i++)
-        m->cosine[i] = get_cosine(m, m->best, i);
+        m->cosine[i] = get_cosine(m, r, i);
     for (int i = 0; i < m->n; i++) {
         bool is_nearest = m->cosine[i] > cos(m->tolerance);
         for (int k = 0; k < m->n && is_nearest; k++)
@@ -107,28 +125,69 @@ static int keep_nearest(const struct match *m, struct gn_fisheye_sighting *out)
         struct gn_fisheye_sighting *s = &out[kept++];
         memcpy(s->xy, m->candidates[i].xy, sizeof(s->xy));
         memcpy(s->dir_world, m->candidates[i].dir_world, sizeof(s->dir_world));
-        s->error_deg = 0;
+        s->error_deg = acos(fmin(m->cosine[i], 1)) * DEGREE;
     }
     return kept;
 }
 
-/** From the best pair to all that it explains; how many these are. */
-static int settle(struct match *m, const struct gn_projection *projection,
+/** From an orientation of two to one of all that it explains; how many these are. */
+static int settle(const struct match *m, const struct gn_projection *projection, double r[static 9],
                   struct gn_fisheye_sighting *out)
 {
     int found = 0;
     // Again from all that was kept: the first orientation leans on two of them only.
-    for (int round = 0; round < 3 && m->best_count >= 2; round++) {
+    for (int round = 0; round < 3; round++) {
         struct gn_pose pose;
         double spread, full[16];
-        found = keep_nearest(m, out);
+        found = keep_nearest(m, r, out);
         if (gn_fisheye_find_orientation(projection, out, found, &pose, &spread) < 0)
             break;
         gn_pose_to_matrix(&pose, full);
         for (int i = 0; i < 9; i++)
-            m->best[i] = full[4 * (i / 3) + i % 3];
+            r[i] = full[4 * (i / 3) + i % 3];
     }
     return found;
+}
+
+static double get_rms_deg(const struct gn_fisheye_sighting *sightings, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += sightings[i].error_deg * sightings[i].error_deg;
+    return sqrt(sum / n);
+}
+
+/** Whether two orientations are apart by more than candidates may be off. */
+static bool is_elsewhere(const struct match *m, const double a[static 9], const double b[static 9])
+{
+    double trace = 0;
+    for (int i = 0; i < 9; i++)
+        trace += a[i] * b[i];
+    return (trace - 1) / 2 < cos(2 * m->tolerance);
+}
+
+/** Whether another orientation explains as many, and them about as well. others: [n], scratch. */
+static bool has_rival(const struct match *m, const struct gn_projection *projection,
+                      const struct gn_fisheye_sighting *found, int n_found, int stride,
+                      struct gn_fisheye_sighting *others)
+{
+    double rms_deg = get_rms_deg(found, n_found);
+    uint32_t at = 0;
+    int n_left = max_rivals;
+    for (int i = 0; i < m->n; i++)
+        for (int k = i + 1; k < m->n; k++) {
+            double r[9], error;
+            if (!is_pair(m, i, k) || (at++ * 2654435761u >> 8) % (uint32_t)stride != 0 ||
+                turn_pair(m, i, k, r) < 0 || !is_elsewhere(m, r, m->best) ||
+                count_explained(m, r, &error) < n_found)
+                continue;
+            if (settle(m, projection, r, others) >= n_found && is_elsewhere(m, r, m->best) &&
+                get_rms_deg(others, n_found) < rms_deg + GN_FISHEYE_MIN_CONTRAST_DEG)
+                return true;
+            if (--n_left == 0)
+                return false;
+        }
+    return false;
 }
 
 int gn_fisheye_match(const struct gn_projection *projection,
@@ -142,17 +201,27 @@ int gn_fisheye_match(const struct gn_projection *projection,
                       .best_error = INFINITY,
                       .seen = calloc((size_t)n + 1, sizeof(*m.seen)),
                       .cosine = calloc((size_t)n + 1, sizeof(*m.cosine))};
+    struct gn_fisheye_sighting *others = calloc((size_t)n + 1, sizeof(*others));
     int found = 0;
-    if (m.seen && m.cosine) {
+    if (m.seen && m.cosine && others) {
         for (int i = 0; i < n; i++)
             if (!gn_projection_get_direction(projection, candidates[i].xy[0], candidates[i].xy[1],
                                              m.seen[i]))
                 m.seen[i][0] = m.seen[i][1] = m.seen[i][2] = NAN; // outside: near nothing
         try_pairs(&m, out_stride);
-        found = settle(&m, projection, out_sightings);
+        if (m.best_count >= 2)
+            found = settle(&m, projection, m.best, out_sightings);
+        if (found >= 2 && has_rival(&m, projection, out_sightings, found, *out_stride, others))
+            found =
+                gn_error_set(out_error, -EDOM,
+                             "two orientations bring %d spots to their lamps alike: is the "
+                             "projection right? A picture for each lamp, or a third lamp, would "
+                             "tell them apart",
+                             found);
     } else {
         found = gn_error_set(out_error, -ENOMEM, "out of memory");
     }
+    free(others);
     free(m.cosine);
     free(m.seen);
     if (found >= 0 && found < 2)

@@ -6,10 +6,18 @@
 
 #include "client/cmd_calibrate/calibrate_probe.h"
 
+/** More is not written: shadows would visibly fall another way. */
+#define MAX_UNCERTAINTY_DEG 1.0
+
 int gn_probe_run_read_lamps(struct gn_probe_run *run, struct gn_error *out_error)
 {
     int n = gn_lamps_read_file(gn_probe_run_get(run, "lamps"), run->lamps, out_error);
     run->n_lamps = n < 0 ? 0 : n;
+    if (n == 1)
+        return gn_error_set(out_error, -EINVAL,
+                            "%s has one lamp: two in a picture each, or three, say where the probe "
+                            "looks",
+                            gn_probe_run_get(run, "lamps"));
     return n < 0 ? n : 0;
 }
 
@@ -55,6 +63,27 @@ int gn_probe_run_look_for_lamps(struct gn_probe_run *run, int picture, const str
     return 0;
 }
 
+/** Refuses where a lamp is in none of the spots that it should be. */
+static int check_lamps(const struct gn_probe_run *run, struct gn_error *out_error)
+{
+    for (int k = 0; k < run->n_lamps; k++) {
+        const double *dir = run->lamps[k].dir_world;
+        bool is_looked_for = false, is_seen = false;
+        for (int i = 0; i < run->n_candidates; i++)
+            is_looked_for |= memcmp(run->candidates[i].dir_world, dir, 3 * sizeof(*dir)) == 0;
+        for (int i = 0; i < run->n_matched; i++)
+            is_seen |= memcmp(run->matched[i].dir_world, dir, 3 * sizeof(*dir)) == 0;
+        if (is_looked_for && !is_seen)
+            return gn_error_set(
+                out_error, -EDOM,
+                "lamp %d, direction %.3f %.3f %.3f, is not where the others say: is "
+                "each way from the probe to the lamp, in the marker's frame, and "
+                "is the projection right? (Leave out a lamp that is hidden.)",
+                k + 1, dir[0], dir[1], dir[2]);
+    }
+    return 0;
+}
+
 int gn_probe_run_fit_lamps(struct gn_probe_run *run, struct gn_error *out_error)
 {
     struct gn_projection projection = run->setup.projection;
@@ -70,7 +99,9 @@ int gn_probe_run_fit_lamps(struct gn_probe_run *run, struct gn_error *out_error)
     if (n < 0)
         return n;
     run->n_matched = n;
-    int err = gn_fisheye_fit(&projection, moves, run->matched, n, &fit, out_error);
+    int err = check_lamps(run, out_error);
+    if (!err)
+        err = gn_fisheye_fit(&projection, moves, run->matched, n, &fit, out_error);
     if (err)
         return err;
     for (int i = 0; i < n; i++)
@@ -83,6 +114,11 @@ int gn_probe_run_fit_lamps(struct gn_probe_run *run, struct gn_error *out_error)
            "degrees, condition number %.1f (at most %.0f)\n",
            q[0], q[1], q[2], q[3], n, fit.rms_deg, fit.uncertainty_deg, fit.condition,
            GN_FISHEYE_MAX_CONDITION);
+    if (fit.uncertainty_deg > MAX_UNCERTAINTY_DEG)
+        return gn_error_set(out_error, -EDOM,
+                            "the orientation is uncertain by %.2f degrees, more than %.1f: lamps "
+                            "farther away, more of them, or their places measured better",
+                            fit.uncertainty_deg, MAX_UNCERTAINTY_DEG);
     run->setup.projection = fit.projection;
     run->world_from_probe = fit.world_from_probe;
     run->has_pose = true;

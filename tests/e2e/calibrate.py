@@ -233,6 +233,16 @@ def check_probe():
         f.write('wrong.txt', b'* 0 0 1\n* 1 0 0\n')
         refuse('no orientation', 'probe', '--files', f.at('p0.png'), '--lamps', f.at('wrong.txt'), '--out',
                f.at('probe.json'))
+        mirrored = [' '.join([w[0], '%.6f' % -float(w[1])] + w[2:]) for w in (x.split() for x in lines[1:])]
+        f.write('mirrored.txt', '\n'.join(mirrored).encode())
+        refuse('is not where the others say', 'probe', '--files', f.at('p*.png'), '--lamps',
+               f.at('mirrored.txt'), '--out', f.at('probe.json'))
+        f.write('swapped.txt', '\n'.join(lines[1:3]).encode())
+        refuse('two orientations', 'probe', '--files', f.at('p0.png'), '--lamps', f.at('swapped.txt'), '--out',
+               f.at('probe.json'))
+        f.write('one.txt', lines[1].encode())
+        refuse('has one lamp', 'probe', '--files', f.at('p0.png'), '--lamps', f.at('one.txt'), '--out',
+               f.at('probe.json'))
         f.write('zero.txt', b'p0.png 0 0 0\n')
         refuse('line 1: right would be', 'probe', '--files', f.at('p0.png'), '--lamps', f.at('zero.txt'),
                '--out', f.at('probe.json'))

@@ -217,6 +217,33 @@ static void test_refusals(void **unused)
     assert_int_equal(n, 20);
 }
 
+/* Two lamps in one picture may be each other; in two pictures, or with a third, they are not. */
+static void test_two_lamps(void **unused)
+{
+    (void)unused;
+    struct gn_projection p = make_projection();
+    const struct gn_pose truth = {{0.8, 0, 0.6, 0}, {0}};
+    struct gn_fisheye_sighting lamps[3], s[9];
+    struct gn_fisheye_puzzle candidates[9];
+    struct gn_error e = {0};
+    int stride = 0, n = 0;
+    assert_int_equal(see(&p, &truth, 3, 1.2, 0, lamps), 3);
+    for (int n_lamps = 2; n_lamps <= 3; n_lamps++) {
+        n = 0;
+        for (int i = 0; i < n_lamps * n_lamps; i++, n++) {
+            memcpy(candidates[i].xy, lamps[i / n_lamps].xy, sizeof(lamps[0].xy));
+            memcpy(candidates[i].dir_world, lamps[i % n_lamps].dir_world, 3 * sizeof(double));
+            candidates[i].picture = 0;
+        }
+        int found = gn_fisheye_match(&p, candidates, n, 2, s, &stride, &e);
+        assert_int_equal(found, n_lamps == 2 ? -EDOM : 3);
+    }
+    assert_non_null(strstr(e.text, "two orientations bring 2 spots to their lamps alike"));
+    candidates[1] = candidates[4]; // each with its own spot, in a picture of its own
+    candidates[1].picture = 1;
+    assert_int_equal(gn_fisheye_match(&p, candidates, 2, 2, s, &stride, &e), 2);
+}
+
 /* A flare 4 px (2.4 degrees) below two lamps in three, within the tolerance: it is no second
  * sighting. */
 static void test_flares(void **unused)
@@ -414,11 +441,12 @@ static void test_wahba(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rig_frames), cmocka_unit_test(test_lens),
-        cmocka_unit_test(test_refusals),   cmocka_unit_test(test_image_circle),
-        cmocka_unit_test(test_ball),       cmocka_unit_test(test_mask),
-        cmocka_unit_test(test_wahba),      cmocka_unit_test(test_flares),
-        cmocka_unit_test(test_many_pairs), cmocka_unit_test(test_rim_of_codes),
+        cmocka_unit_test(test_rig_frames),   cmocka_unit_test(test_lens),
+        cmocka_unit_test(test_refusals),     cmocka_unit_test(test_image_circle),
+        cmocka_unit_test(test_ball),         cmocka_unit_test(test_mask),
+        cmocka_unit_test(test_wahba),        cmocka_unit_test(test_two_lamps),
+        cmocka_unit_test(test_flares),       cmocka_unit_test(test_many_pairs),
+        cmocka_unit_test(test_rim_of_codes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
