@@ -249,8 +249,13 @@ static int read_projection(const struct gn_json *object, struct gn_projection *o
     if (ret == 0 && gn_json_has(object, "radius"))
         ret = gn_json_get_double(object, "radius", 1e-3, 1e6, &out->radius, out_error);
     if (ret == 0 && gn_json_has(object, "theta_max"))
-        ret = gn_json_get_double(object, "theta_max", 1e-3, GN_PROJECTION_MAX_THETA,
-                                 &out->theta_max, out_error);
+        ret =
+            gn_json_get_double(object, "theta_max", -DBL_MAX, DBL_MAX, &out->theta_max, out_error);
+    if (ret == 0 && gn_json_has(object, "theta_max") &&
+        !(out->theta_max >= 1e-3 && out->theta_max <= GN_PROJECTION_MAX_THETA))
+        ret = gn_json_refuse(object, "theta_max", out_error,
+                             "expected radians in [0.001, %.10g], found %.10g",
+                             GN_PROJECTION_MAX_THETA, out->theta_max);
     if (ret == 0 && gn_json_has(object, "k"))
         ret = gn_json_get_numbers(object, "k", 4, out->k, out_error);
     if (ret == 0 && gn_json_has(object, "vignetting"))

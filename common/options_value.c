@@ -298,11 +298,13 @@ int gn_options_set(const struct gn_options *options, struct gn_option_instance *
     struct gn_option_value new_value = {.rank = rank, .line = value->line};
     if (!parse_value(option, text, &new_value)) {
         char expected[512], meant[GN_OPTIONS_MAX_LABEL] = "";
+        const char *unit = option->type == GN_OPTION_DOUBLE ? option->value_name : NULL;
         gn_option_get_expectation(option, sizeof(expected), expected);
         if (option->type == GN_OPTION_ENUM || option->type == GN_OPTION_SET)
             suggest_choice(option, text, meant);
-        return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s, found '%.80s'%s%s%s", where,
-                            label, expected, option->is_secret ? "(hidden)" : text,
+        return gn_error_set(out_error, -EINVAL, "%s: %s: expected %s%s%s%s, found '%.80s'%s%s%s",
+                            where, label, expected, unit ? " (" : "", unit ? unit : "",
+                            unit ? ")" : "", option->is_secret ? "(hidden)" : text,
                             meant[0] == '\0' ? "" : "; did you mean '", meant,
                             meant[0] == '\0' ? "" : "'?");
     }

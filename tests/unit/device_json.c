@@ -117,7 +117,7 @@ static void test_refusals(void **unused)
         {"{\"projection\":\"latlong\",\"raduis\":1}",
          "p.json: unknown key 'raduis'; did you mean 'radius'?"},
         {"{\"projection\":\"angular\",\"theta_max\":3.1416}",
-         "p.json: theta_max: expected a number in [0.001, 3.141593654], found 3.1416"},
+         "p.json: theta_max: expected radians in [0.001, 3.141593654], found 3.1416"},
         {"{\"projection\":\"angular\",\"radius\":0}", "p.json: radius: expected a number in ["},
         {"{\"projection\":\"angular\",\"width\":16385}",
          "p.json: width: expected a whole number in [1, 16384], found 16385"},
