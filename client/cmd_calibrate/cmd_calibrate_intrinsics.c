@@ -142,7 +142,8 @@ static int look_all(struct run *run, const struct gn_options *options, struct gn
         if (err)
             break;
         if (n < GN_CALIBRATE_MIN_CORNERS)
-            printf("%s: no board (%d corners)\n", path, n);
+            printf("%s: no board (%d corners)%s\n", path, n,
+                   run->set.board.is_charuco ? "" : "; a chessboard must be whole in the picture");
         else
             printf("%s: %d corners\n", path, n);
         if (n >= GN_CALIBRATE_MIN_CORNERS)
