@@ -11,6 +11,10 @@
 /* What a patch's code is not known better than, whatever its pixels say: drift of lamp and lens. */
 #define LOG_FLOOR 5e-4    // share of full scale
 #define LINEAR_FLOOR 2e-3 // share of the code
+/* Codes that differ by so many sigmas differ. */
+#define SURE_SIGMAS 5
+/* Fewer values of a picture say nothing of the picture. */
+#define LEAST_VALUES 3
 
 struct fit {
     const struct gn_chart_shot *shots;
@@ -32,6 +36,41 @@ static double get_sigma(const struct fit *f, const struct gn_chart_patch *patch,
                             ? LOG_FLOOR
                             : LINEAR_FLOOR * patch->code[channel] + step / 4;
     return hypot(pixels, floor_code);
+}
+
+/* How many patches' codes, of those that are not clipped in both, are clearly lower in b. */
+static int count_falling(const struct fit *f, const struct gn_chart_shot *a,
+                         const struct gn_chart_shot *b, int *out_n)
+{
+    int n_falling = 0;
+    *out_n = 0;
+    for (int j = 0; j < GN_CHART_PATCHES; j++)
+        for (int c = 0; c < f->n_channels; c++) {
+            const struct gn_chart_patch *p = &a->patches[j], *q = &b->patches[j];
+            if (p->clipped[c] > MAX_CLIPPED && q->clipped[c] > MAX_CLIPPED)
+                continue;
+            double noise = hypot(get_sigma(f, p, c), get_sigma(f, q, c));
+            n_falling += p->code[c] - q->code[c] > SURE_SIGMAS * noise;
+            ++*out_n;
+        }
+    return n_falling;
+}
+
+/* Refuses times in another order than the pictures' codes. */
+static int check_order(const struct fit *f, struct gn_error *out_error)
+{
+    for (int k = 0; k < f->n; k++)
+        for (int l = 0; l < f->n; l++) {
+            const struct gn_chart_shot *a = &f->shots[k], *b = &f->shots[l];
+            int n = 0, n_falling = a->time < b->time ? count_falling(f, a, b, &n) : 0;
+            if (n_falling >= LEAST_VALUES && 2 * n_falling > n)
+                return gn_error_set(out_error, -EDOM,
+                                    "codes fall as the exposure rises: are the times in the "
+                                    "pictures' order? %d of %d are lower in %s, exposure %g, than "
+                                    "in %s, exposure %g",
+                                    n_falling, n, b->name, b->time, a->name, a->time);
+        }
+    return 0;
 }
 
 /* With times, a group is a patch in a channel; without, the greys of a picture in a channel. */
@@ -155,15 +194,19 @@ static int fit_all(struct fit *f, struct gn_chart_response *r, struct gn_error *
                             "codes lie between the rails",
                             f->n_samples, r->n_points);
     double unit = 0;
-    int err = gn_curve_fit(f->options->model, f->samples, f->n_samples, f->n_groups, f->u,
+    int err = check_order(f, out_error);
+    if (!err)
+        err = gn_curve_fit(f->options->model, f->samples, f->n_samples, f->n_groups, f->u,
                            &r->curve, out_error);
     if (!err)
         err = find_unit(f, &unit, out_error);
     if (err)
         return err;
     gn_curve_rescale(&r->curve, exp(unit));
-    for (int i = 0; i < f->n_samples; i++)
+    for (int i = 0; i < f->n_samples; i++) {
+        f->points[f->point_of[i]].is_fitted = true;
         f->points[f->point_of[i]].is_outlier = f->samples[i].is_outlier;
+    }
     find_colours(f, unit, r);
     if (f->n_channels == 3 && !f->options->has_no_matrix) {
         err = gn_chart_fit_matrix(r->device, f->options->keeps_white, &r->matrix, out_error);
@@ -224,6 +267,65 @@ int gn_chart_response_fit(const struct gn_chart_shot *shots, int n,
         gn_chart_response_finish(&r);
     *out = r;
     return err;
+}
+
+double gn_chart_response_get_error(const struct gn_chart_response *response, int shot, int *out_n)
+{
+    double sum = 0;
+    *out_n = 0;
+    for (int i = 0; i < response->n_points; i++) {
+        const struct gn_chart_point *p = &response->points[i];
+        if (p->shot == shot && !p->is_clipped && !p->is_outlier && p->uncertainty < GN_CHART_SURE) {
+            sum += p->error * p->error;
+            ++*out_n;
+        }
+    }
+    return *out_n > 0 ? sqrt(sum / *out_n) : 0;
+}
+
+/* The picture's values that the curve was fitted to, and those found off it. */
+static int count_fitted(const struct gn_chart_response *response, int shot, int *out_n_outliers)
+{
+    int n = 0;
+    *out_n_outliers = 0;
+    for (int i = 0; i < response->n_points; i++) {
+        const struct gn_chart_point *p = &response->points[i];
+        n += p->shot == shot && p->is_fitted;
+        *out_n_outliers += p->shot == shot && p->is_outlier;
+    }
+    return n;
+}
+
+int gn_chart_response_check(const struct gn_chart_shot *shots, int n,
+                            const struct gn_chart_response *response, struct gn_error *out_error)
+{
+    static const char right[] = "right would be one chart at rest in steady light, gain and white "
+                                "balance locked, and times in the pictures' order";
+    const struct gn_curve *curve = &response->curve;
+    int worst = 0, most = -1;
+    for (int k = 0; k < n; k++) {
+        int n_outliers, n_sure, n_fitted = count_fitted(response, k, &n_outliers);
+        double error = gn_chart_response_get_error(response, k, &n_sure);
+        if (n_fitted >= LEAST_VALUES && 2 * n_outliers > n_fitted)
+            return gn_error_set(out_error, -EDOM,
+                                "%d of the %d values of %s are off the other pictures' curve; %s",
+                                n_outliers, n_fitted, shots[k].name, right);
+        if (n_sure >= LEAST_VALUES && error > GN_CHART_MAX_SHOT_ERROR)
+            return gn_error_set(out_error, -EDOM,
+                                "%s lies %.1f %% RMS off the curve, at most %g %% is right; %s",
+                                shots[k].name, 100 * error, 100 * GN_CHART_MAX_SHOT_ERROR, right);
+        if (n_outliers > most) {
+            most = n_outliers;
+            worst = k;
+        }
+    }
+    if (2 * curve->n_outliers > curve->n_used)
+        return gn_error_set(out_error, -EDOM,
+                            "%d of %d values lie on no common curve, %d of them of %s; at most a "
+                            "third is right; %s",
+                            curve->n_outliers, curve->n_outliers + curve->n_used, most,
+                            shots[worst].name, right);
+    return 0;
 }
 
 void gn_chart_response_finish(struct gn_chart_response *response)

@@ -19,6 +19,9 @@
 #define GN_CHART_MAX_SHOTS 64
 /** Codes whose light is known better than this, relative, tell how good a fit is. */
 #define GN_CHART_SURE 0.01
+/** RMS error of such codes of a picture above which it is no picture of the same light and camera:
+ * good series stay below 0.025. */
+#define GN_CHART_MAX_SHOT_ERROR 0.1
 
 /** One picture of the chart. */
 struct gn_chart_shot {
@@ -42,7 +45,9 @@ struct gn_chart_point {
     double light;       // what the fit takes the patch's light to be
     double error;       // light of the code over that, minus 1
     double uncertainty; // of the code's light, relative: its noise and its steps
-    bool is_clipped, is_outlier;
+    bool is_clipped;
+    bool is_fitted;  // the curve is fitted to it
+    bool is_outlier; // and found it off
 };
 
 struct gn_chart_response {
@@ -59,12 +64,24 @@ struct gn_chart_response {
 
 /**
  * Fits curve and matrix to n shots. Clipped patches (more than 2 % of pixels in the rails) are left
- * out, outlying ones found and marked. *out is zeroed on failure. Returns 0, or -EDOM (not
- * determined), -EINVAL, -ENOMEM and a sentence. Thread-safety: safe.
+ * out, outlying ones found and marked; times in another order than the codes are refused. *out is
+ * zeroed on failure. Returns 0, or -EDOM (not determined), -EINVAL, -ENOMEM and a sentence.
+ * Thread-safety: safe.
  */
 GN_MUST_USE int gn_chart_response_fit(const struct gn_chart_shot *shots, int n,
                                       const struct gn_chart_response_options *options,
                                       struct gn_chart_response *out, struct gn_error *out_error);
+/** RMS error of the codes of a picture that are sure to GN_CHART_SURE, *out_n of them; 0 of none.
+ */
+double gn_chart_response_get_error(const struct gn_chart_response *response, int shot, int *out_n);
+/**
+ * Refuses a curve that does not hold for its own pictures: more than half of one left out, or off
+ * by more than GN_CHART_MAX_SHOT_ERROR, or more than a third of all left out. Returns 0, or -EDOM
+ * and a sentence that names it. Thread-safety: safe.
+ */
+GN_MUST_USE int gn_chart_response_check(const struct gn_chart_shot *shots, int n,
+                                        const struct gn_chart_response *response,
+                                        struct gn_error *out_error);
 /** NULL-safe; zeroes *response. */
 void gn_chart_response_finish(struct gn_chart_response *response);
 

@@ -183,21 +183,15 @@ static void print_points(const struct gn_chart_shot *shots, int n,
 {
     for (int k = 0; k < n; k++) {
         int used = 0, clipped = 0, n_values = 0;
-        double sum = 0;
         for (int i = 0; i < r->n_points; i++) {
-            const struct gn_chart_point *p = &r->points[i];
-            if (p->shot != k)
-                continue;
-            n_values++;
-            clipped += p->is_clipped;
-            bool is_sure = !p->is_clipped && !p->is_outlier && p->uncertainty < GN_CHART_SURE;
-            used += is_sure;
-            sum += is_sure ? p->error * p->error : 0;
+            n_values += r->points[i].shot == k;
+            clipped += r->points[i].shot == k && r->points[i].is_clipped;
         }
+        double error = gn_chart_response_get_error(r, k, &used);
         printf("%s: exposure %.4g, %d of %d codes clipped; ", shots[k].name, r->time[k], clipped,
                n_values);
         if (used > 0)
-            printf("error %.2f %% RMS over %d sure to %.0f %%\n", 100 * sqrt(sum / used), used,
+            printf("error %.2f %% RMS over %d sure to %.0f %%\n", 100 * error, used,
                    100 * GN_CHART_SURE);
         else
             printf("no code fine enough to be sure to %.0f %%\n", 100 * GN_CHART_SURE);
@@ -300,8 +294,10 @@ int gn_calibrate_chart(const struct gn_options *options, const struct gn_calibra
     if (!err) {
         print_points(shots, series->n, &response);
         print_results(&response);
-        err = write_results(&run, &response, out_error);
+        err = gn_chart_response_check(shots, series->n, &response, out_error);
     }
+    if (!err)
+        err = write_results(&run, &response, out_error);
     gn_chart_response_finish(&response);
     gn_image_finish(&run.mean);
     return err;

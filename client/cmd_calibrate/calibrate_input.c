@@ -166,7 +166,7 @@ int gn_calibrate_read_numbers(const char *option, const char *text, int n, int c
         } else if (count >= capacity || !gn_calibrate_take_number(&at, &out_values[count])) {
             count = gn_error_set(out_error, -EINVAL,
                                  "--%s: number %d is none, or one too many; right would be up to "
-                                 "%d numbers as 0.5,1/60,2 or a file with them",
+                                 "%d numbers without a unit, as 0.5,1/60,2, or a file with them",
                                  option, count + 1, n > 0 ? n : capacity);
             break;
         } else {

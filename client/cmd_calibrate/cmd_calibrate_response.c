@@ -36,8 +36,9 @@ static const struct gn_option option_table[] = {
      .flag = "times",
      .type = GN_OPTION_STRING,
      .value_name = "LIST",
-     .help = "Exposure times in the pictures' order, any unit: 1/60,1/30,0.25 or a file with them. "
-             "A chart on a log sensor does without; they are then found from its greys."},
+     .help = "Exposure times in the pictures' order, in any one unit but without it: "
+             "1/60,1/30,0.25 or a file with them. A chart on a log sensor does without; they are "
+             "then found from its greys."},
     {.key = "model",
      .flag = "model",
      .type = GN_OPTION_ENUM,

@@ -135,6 +135,26 @@ def check_chart():
         assert open(f.at('bad.json')).read() == '{"width": 0, "fx": 1}'
 
 
+def check_chart_order():
+    """Times that are not the pictures' are refused, whatever curve they would give."""
+    cases = (('linear', (9, .3, 1, 3, 30), (.3, 1, 3, 9, 30), lambda v: .01 + .9 * v / 30),
+             ('log', (100, 2, 10, 30, 500, 2000), (2, 10, 30, 100, 500, 2000),
+              lambda v: A + B * math.log(C + v / 100)))
+    for model, times, wrong, encode in cases:
+        with Folder() as f:
+            for i, t in enumerate(times):
+                f.write('chart%d.png' % i, chart_picture(lambda v, t=t, encode=encode: encode(t * v)))
+            start = ('response', '--chart', f.at('chart*.png'), '--full-scale', 4095, '--corners', CORNERS,
+                     '--no-matrix', '--model', model, '--out', f.at('camera.json'), '--times')
+            refuse('codes fall as the exposure rises: are the times', *start, ','.join(map(str, wrong)))
+            # In their order, but of other pictures: named is one that lies off.
+            far = [t * 3 if i == 2 else t for i, t in enumerate(times)]
+            refuse('chart2.png', *start, ','.join(map(str, far)))
+            refuse('without a unit', *start, ','.join('%gms' % t for t in times))
+            assert not os.path.exists(f.at('camera.json'))
+            succeed(*start, ','.join(map(str, times)))
+
+
 def check_chart_found():
     with Folder() as f:
         write_charts(f, [1, .1, 10])
@@ -405,8 +425,8 @@ def check_refusals():
 
 
 def main():
-    tests = [check_chart, check_chart_found, check_stack, check_probe, check_ball, check_raw_photographs,
-             check_photograph_in_colour, check_published_intrinsics, check_refusals]
+    tests = [check_chart, check_chart_order, check_chart_found, check_stack, check_probe, check_ball,
+             check_raw_photographs, check_photograph_in_colour, check_published_intrinsics, check_refusals]
     print('1..%d' % len(tests))
     failed = 0
     for n, test in enumerate(tests, 1):

@@ -286,6 +286,44 @@ static void test_refusals(void **unused)
     }
 }
 
+/* A curve that its own pictures do not bear out, at each of the bounds and just beyond. */
+static void test_check(void **unused)
+{
+    (void)unused;
+    const struct {
+        int n_off[3]; // outliers of 20 values
+        double error; // of the second picture's other values
+        const char *word;
+    } cases[] = {
+        {{10, 0, 0}, 0, NULL},
+        {{0, 11, 0}, 0, "11 of the 20 values of b are off"},
+        {{7, 7, 6}, 0, NULL},
+        {{7, 6, 8}, 0, "21 of 60 values lie on no common curve, 8 of them of c"},
+        {{0, 0, 0}, 0.0999, NULL},
+        {{0, 0, 0}, -0.102, "b lies 10.2 % RMS off the curve, at most 10 % is right"},
+    };
+    const struct gn_chart_shot shots[3] = {{.name = "a"}, {.name = "b"}, {.name = "c"}};
+    for (size_t i = 0; i < GN_ARRAY_LEN(cases); i++) {
+        struct gn_chart_point points[60] = {{0}};
+        struct gn_chart_response r = {.n_points = 60, .points = points};
+        for (int k = 0; k < 60; k++) {
+            bool is_off = k % 20 < cases[i].n_off[k / 20];
+            points[k] = (struct gn_chart_point){.shot = k / 20,
+                                                .is_fitted = true,
+                                                .is_outlier = is_off,
+                                                .error = is_off        ? 9
+                                                         : k / 20 == 1 ? cases[i].error
+                                                                       : 0};
+            r.curve.n_outliers += is_off;
+            r.curve.n_used += !is_off;
+        }
+        struct gn_error e = {0};
+        assert_int_equal(gn_chart_response_check(shots, 3, &r, &e), cases[i].word ? -EDOM : 0);
+        if (cases[i].word && !strstr(e.text, cases[i].word))
+            fail_msg("case %zu: \"%s\" does not say \"%s\"", i, e.text, cases[i].word);
+    }
+}
+
 /* The chart turned by 180 degrees is recognised by its patches' order. */
 static void test_orientation(void **unused)
 {
@@ -345,7 +383,8 @@ int main(void)
         cmocka_unit_test(test_log_sensor),   cmocka_unit_test(test_matrix),
         cmocka_unit_test(test_extreme_dark), cmocka_unit_test(test_linear_sensor),
         cmocka_unit_test(test_outliers),     cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_orientation),  cmocka_unit_test(test_reflectances),
+        cmocka_unit_test(test_check),        cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_reflectances),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
