@@ -183,10 +183,11 @@ int gn_options_check(const struct gn_options *options, struct gn_error *out_erro
     const struct gn_program *program = options->program;
     if (n < program->min_arguments || n > program->max_arguments)
         return gn_error_set(
-            out_error, -EINVAL, "command line: %s%.64s; usage: %s %s",
+            out_error, -EINVAL, "command line: %s%.64s%s; usage: %s %s",
             n > program->max_arguments ? "too many words, unexpected " : "a word is missing",
             n > program->max_arguments ? options->arguments[program->max_arguments] : "",
-            program->name, program->usage);
+            options->is_after_files ? " (put a pattern in quotes)" : "", program->name,
+            program->usage);
     return 0;
 }
 

@@ -165,6 +165,8 @@ int gn_options_read_arguments(struct gn_options *options, int argc, char *const 
                                 "see %s --help",
                                 word, options->program->name);
         } else {
+            // What the shell makes of a pattern without quotes.
+            options->is_after_files |= i > 2 && strcmp(argv[i - 2], "--files") == 0;
             options->arguments[options->n_arguments++] = word;
         }
         i += n_used;
