@@ -19,6 +19,8 @@
 enum { SURE_AFTER = 3 };
 /** Between two lines that tell it. */
 static const int64_t tell_interval_ns = INT64_C(20000000000);
+/** A marker's side that is rather millimetres, m. */
+#define LARGE_SIDE 1.0
 
 struct gn_poses {
     struct gn_bodies bodies;
@@ -80,6 +82,24 @@ int64_t gn_poses_get_time_ns(const struct gn_capture *capture)
     return capture->time_ns ? capture->time_ns : (int64_t)llround(capture->time_s * 1e9);
 }
 
+/** Says where a marker is so large that its size is hardly meant in metres. */
+static void check_sizes(const struct gn_poses *p)
+{
+    for (int i = 0; i < p->bodies.n_bodies; i++) {
+        for (int k = 0; k < p->bodies.bodies[i].n_markers; k++) {
+            struct gn_body_marker *m = &p->bodies.bodies[i].markers[k];
+            double(*c)[3] = m->corners_body;
+            double side = sqrt(pow(c[1][0] - c[0][0], 2) + pow(c[1][1] - c[0][1], 2) +
+                               pow(c[1][2] - c[0][2], 2));
+            if (side > LARGE_SIDE * (1 + 1e-9)) {
+                fprintf(stderr, "gnomon: %s: marker %d: sizes are in metres: %g m?\n", p->source,
+                        m->id, side);
+                return;
+            }
+        }
+    }
+}
+
 int gn_poses_open(const struct gn_options *options, const struct gn_camera *camera,
                   const char *object, struct gn_poses **out_poses, struct gn_error *out_error)
 {
@@ -99,6 +119,8 @@ int gn_poses_open(const struct gn_options *options, const struct gn_camera *came
         struct gn_body *b = &p->bodies.bodies[0];
         snprintf(b->name, sizeof(b->name), "%s", object);
     }
+    if (!err)
+        check_sizes(p);
     p->world = gn_bodies_find(&p->bodies, GN_BODY_WORLD);
     const struct gn_tracker_options wanted = {
         .camera = camera,

@@ -23,7 +23,7 @@ struct track_camera {
     int body;
     struct gn_msg_pose message;
     int64_t ahead_ns;
-    long n_poses;
+    long n_poses, n_worldless; // pictures; that show the object, but no marker of the world
 };
 
 static const char *find_misuse(const struct gn_options *options)
@@ -107,6 +107,7 @@ static bool get_object(struct track_camera *t, int64_t time_ns, struct gn_pose *
             return false;
         gn_pose_multiply(&t->camera.world_from_camera, out, out);
     } else if (!gn_poses_get_body(t->poses, t->body, out)) {
+        t->n_worldless += gn_poses_get_in_camera(t->poses, t->body, out);
         return false;
     }
     int step = gn_pose_filter_update(&t->filter, time_ns, out);
@@ -143,7 +144,12 @@ static int report(struct gn_feed *feed, int err, const struct gn_error *error)
     struct track_camera *t = (struct track_camera *)feed;
     struct gn_error unseen = {0};
     if (!err && t->n_poses == 0) {
-        err = gn_error_set(&unseen, -ENODATA, "the object's markers were in no picture");
+        err = t->n_worldless > 0
+                  ? gn_error_set(&unseen, -ENODATA,
+                                 "%ld pictures show the object's markers, none of them a marker of "
+                                 "\"" GN_BODY_WORLD "\", which says where the camera is",
+                                 t->n_worldless)
+                  : gn_error_set(&unseen, -ENODATA, "the object's markers were in no picture");
         error = &unseen;
     }
     if (err)

@@ -168,15 +168,30 @@ static int begin(struct gn_feed *r, struct gn_error *out_error)
     return err || !v->dir || !v->poses ? err : gn_poses_write_to(v->poses, v->dir, out_error);
 }
 
+/** Whether all went its way and yet nothing came of it, and why. */
+static int check_outcome(const struct gn_viewer *v, struct gn_error *out_error)
+{
+    if (v->n_results == 0 && v->n_dropped > 0)
+        return gn_error_set(out_error, -ENODATA, "no frame was rendered: %s%s", v->last_drop,
+                            v->is_unlit ? "; is a gnomon probe running?" : "");
+    if (v->n_unplaced > 0 && v->n_unplaced == v->feed.n_sent)
+        return gn_error_set(
+            out_error, -ENODATA,
+            "no picture says where the camera is, so nothing virtual was drawn: is a "
+            "marker of \"" GN_BODY_WORLD "\", whole and with its white margin, in "
+            "sight? --debug-markers DIR draws what was found");
+    return 0;
+}
+
 static int report(struct gn_feed *r, int err, const struct gn_error *error)
 {
     struct gn_viewer *v = (struct gn_viewer *)r;
-    struct gn_error drop_error = {0}, record_error = {0};
+    struct gn_error outcome = {0}, record_error = {0};
     gn_show_close(&v->show);
     err = v->is_closed ? 0 : err;
-    if (!err && !v->is_closed && v->n_results == 0 && v->n_dropped > 0) {
-        err = gn_error_set(&drop_error, -ENODATA, "no frame was rendered: %s", v->last_drop);
-        error = &drop_error;
+    if (!err && !v->is_closed) {
+        err = check_outcome(v, &outcome);
+        error = err ? &outcome : error;
     }
     struct gn_source_counts counts;
     gn_source_get_counts(r->source, &counts);
@@ -198,6 +213,9 @@ static int report(struct gn_feed *r, int err, const struct gn_error *error)
     if (v->n_unplaced > 0)
         printf("%ld frames without the world's markers: sent to come back as they are\n",
                v->n_unplaced);
+    if (v->n_empty > 0 && v->n_empty + v->n_unplaced >= v->n_results)
+        printf("no virtual object was in any picture: is the camera where it should be? Sizes and "
+               "places are in metres\n");
     gn_poses_print(v->poses, stdout);
     return err || record_err ? 1 : 0;
 }

@@ -43,11 +43,13 @@ struct gn_viewer {
     int n_outstanding;
     struct gn_viewer_pending pending[GN_VIEWER_MAX_OUTSTANDING];
     long n_results, n_dropped;
+    long n_empty;        // results; whose pictures show no virtual object though asked for
     long n_lost;         // frames, with the server
     int n_reconnected;   // times
     int n_dropped_since; // frames since the last result
     double latency_sum_ms, latency_max_ms;
     char last_drop[256]; // why a frame was dropped
+    bool is_unlit;       // because there was no light
 };
 
 /* What feed.h asks of a command; feed is that of a viewer. */

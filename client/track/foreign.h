@@ -33,7 +33,7 @@ void gn_foreign_look(struct gn_foreign *foreign, const struct gn_grey *grey, dou
                      int n_quads);
 
 /** The dictionary that most markers are of; those of 16 cells count when they were read in two
- * pictures. False where there are none. */
+ * pictures, or with ids below 50 in the only one. False where there are none. */
 bool gn_foreign_get(const struct gn_foreign *foreign, struct gn_foreign_finds *out);
 
 #endif

@@ -327,6 +327,7 @@ bool gn_tracker_explain(const struct gn_tracker *t, char *out, size_t out_bytes)
     if (!get_strangers(t, &strangers))
         return false;
     char ids[128] = "", name[2][32];
+    const char *some = strangers.n_ids > 1 ? "are ids" : "is id";
     for (int i = 0, at = 0; i < strangers.n_ids; i++)
         at += snprintf(ids + at, sizeof(ids) - (size_t)at, i ? ", %d" : "%d", strangers.ids[i]);
     gn_marker_print_name(strangers.dictionary, name[0], sizeof(name[0]));
@@ -336,11 +337,11 @@ bool gn_tracker_explain(const struct gn_tracker *t, char *out, size_t out_bytes)
         missing = t->memory[i].was_ever_seen ? NULL : t->bodies->bodies[i].name;
     if (strangers.dictionary == t->bodies->dictionary)
         snprintf(out, out_bytes,
-                 "no marker of \"%s\" is seen, but of %s there are %s, which no body has", missing,
-                 name[0], ids);
+                 "no marker of \"%s\" is seen, but of %s there %s %s, which no body has", missing,
+                 name[0], some, ids);
     else
-        snprintf(out, out_bytes, "no marker of %s is seen, but of %s there are %s", name[1],
-                 name[0], ids);
+        snprintf(out, out_bytes, "no marker of %s is seen, but of %s there %s %s", name[1], name[0],
+                 some, ids);
     return true;
 }
 

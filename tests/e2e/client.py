@@ -225,7 +225,8 @@ def test_no_light():
         probe(daemon, bench).succeed()
         viewer.succeed()
     with Daemon() as daemon, Bench() as bench:
-        view(daemon, bench).fail(1, 'no frame was rendered: no probe has lit the room')
+        view(daemon, bench).fail(1, 'no frame was rendered: no probe has lit the room',
+                                'is a gnomon probe running?')
         report = read_report(bench)
         assert report['dropped'] == 6 and report['results'] == 0
 

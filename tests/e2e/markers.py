@@ -269,9 +269,9 @@ def test_markers_that_are_not_as_listed_are_told():
          r'5(4\.[5-9]|5\.[0-5]) mm apart, not 65\.0'),
         ({**MARKERS, 'bodies': [{'name': 'world', 'markers': [{'id': 9, 'size': 0.08}]},
                                 MARKERS['bodies'][1]]},
-         'no marker of "world" is seen, but of 4x4_50 there are 7,'),
+         'no marker of "world" is seen, but of 4x4_50 there is id 7,'),
         ({**MARKERS, 'dictionary': '6x6_250'}, 'no marker of 6x6_250 is seen, but of 4x4_50 there '
-                                               'are 7, 20, 21, 22, 23'),
+                                               'are ids 7, 20, 21, 22, 23'),
     ]
     with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
         for markers, words in wrong:
@@ -283,6 +283,8 @@ def test_markers_that_are_not_as_listed_are_told():
             assert len(lines) == bool(words), (words, err)
             assert not words or re.search(words, lines[0]), (words, lines)
             assert words or (status == 0 and 'not where they are listed' not in out), out
+            if markers['bodies'][0]['markers'][0]['id'] == 9:
+                assert '5 pictures show the object\'s markers, none of them a marker of "world"' in err
         give_light(daemon, desk)
         # The viewer says it too, and puts nothing where it cannot know where that is.
         upside = {**MARKERS, 'bodies': [{**wrong[1][0]['bodies'][1], 'name': 'world'}]}
@@ -290,9 +292,27 @@ def test_markers_that_are_not_as_listed_are_told():
             'view', server(daemon), '--files', desk.at('shots'), '--camera',
             desk.at('camera.json'), '--markers', desk.write('upside.json', json.dumps(upside)),
             '--out', desk.at('out'))
-        assert status == 0 and err.count('\n') == 1 and '180 degrees fits' in err, err
+        assert status == 1 and err.count('\n') == 2 and '180 degrees fits' in err, err
+        assert 'no picture says where the camera is' in err, err
         assert '%d frames without the world' % SHOTS in out, out
         assert '%d times they were not where they are listed' % (SHOTS - 1) in out, out
+
+
+def test_one_picture_is_enough_to_be_told():
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Desk() as desk:
+        give_light(daemon, desk)
+        for marker, lines in (
+                ('6x6_250:7:0.08', ['no marker of 6x6_250 is seen, but of 4x4_50 there are ids 7, 20',
+                                    'no picture says where the camera is']),
+                ('4x4_50:9:0.08', ['of 4x4_50 there are ids 7, 20, 21, 22, 23, which no body has',
+                                   'no picture says where the camera is']),
+                ('4x4_50:7:80', ['--marker: marker 7: sizes are in metres: 80 m?'])):
+            status, out, err = gnomon(
+                'view', server(daemon), '--files', desk.at('shots/shot-00.png'), '--camera',
+                desk.at('camera.json'), '--marker', marker, '--out', desk.at('one'))
+            assert status == len(lines) - 1 and err.count('\n') == len(lines), (status, err)
+            assert all(line in err for line in lines), (lines, err)
+            assert ('no virtual object was in any picture' in out) == (status == 0), out
 
 
 def test_what_is_wrong_is_said():
@@ -328,4 +348,5 @@ def test_what_is_wrong_is_said():
 
 run_tests([test_each_frame_has_the_pose_of_its_own_picture, test_a_short_text_and_steady_poses,
            test_a_recording_gives_the_same_poses_each_time, test_an_object_follows_its_markers,
-           test_markers_that_are_not_as_listed_are_told, test_what_is_wrong_is_said])
+           test_markers_that_are_not_as_listed_are_told,
+           test_one_picture_is_enough_to_be_told, test_what_is_wrong_is_said])
