@@ -415,6 +415,12 @@ def check_refusals():
         refuse('looks the same upside down', 'intrinsics', '--files', f.at('a.png'), '--board', '9x7', '--out',
                f.at('x.json'))
         refuse('10x7', 'intrinsics', '--files', f.at('a.png'), '--board', '10by7', '--out', f.at('x.json'))
+        refuse('in [0.0001, 10] (METRES)', 'print', '--board', '10x7', '--square', 25, '--out', f.at('x.svg'),
+               status=2)
+        for more, hint in ((['10x7'], '; a chessboard must be whole in the picture'),
+                           (['8x6', '--charuco', '4x4_50'], '')):
+            out = calibrate('intrinsics', '--files', f.at('a.png'), '--out', f.at('x.json'), '--board', *more)[1]
+            assert out == f.at('a.png') + ': no board (0 corners)%s\n' % hint, out
         refuse('the first picture is 64 x 48', 'intrinsics', '--files', f.at('*.png'), '--board', '10x7',
                '--out', f.at('x.json'))
         refuse('the pictures show no colour chart', 'response', '--chart', f.at('a.png'), '--out',
