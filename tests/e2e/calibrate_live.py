@@ -208,7 +208,7 @@ A, B, C = .55, .05, 2e-4
 CURVE = ['--response', 'log:%g,%g,%g' % (A, B, C), '--noise', '2']
 
 
-def response(folder, *more, pixels='RGB12', rate=100):
+def response(folder, *more, pixels='RGB12', rate=30):
     return ['response', '--gige', '127.0.0.1', '--frame-rate', rate, '--pixel-format', pixels, '--out',
             folder.at('probe.json'), *more]
 
