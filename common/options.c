@@ -186,7 +186,7 @@ int gn_options_check(const struct gn_options *options, struct gn_error *out_erro
             out_error, -EINVAL, "command line: %s%.64s%s; usage: %s %s",
             n > program->max_arguments ? "too many words, unexpected " : "a word is missing",
             n > program->max_arguments ? options->arguments[program->max_arguments] : "",
-            options->is_after_files ? " (put a pattern in quotes)" : "", program->name,
+            options->is_after_pattern ? " (put a pattern in quotes)" : "", program->name,
             program->usage);
     return 0;
 }

@@ -134,6 +134,18 @@ static int read_flag(struct gn_options *options, const char *word, const char *n
                           "command line", label, out_error);
 }
 
+/* Whether the word is an option that takes a pattern. */
+static bool takes_pattern(struct gn_options *options, const char *word)
+{
+    struct flag flag;
+    struct gn_error unused = {0};
+    if (strncmp(word, "--", 2) != 0 || find_flag(options, word + 2, &flag, &unused) < 0 ||
+        flag.index < 0)
+        return false;
+    const char *value_name = options->program->options[flag.index].value_name;
+    return value_name != NULL && strcmp(value_name, "PATTERN") == 0;
+}
+
 int gn_options_read_arguments(struct gn_options *options, int argc, char *const argv[],
                               struct gn_error *out_error)
 {
@@ -166,7 +178,7 @@ int gn_options_read_arguments(struct gn_options *options, int argc, char *const 
                                 word, options->program->name);
         } else {
             // What the shell makes of a pattern without quotes.
-            options->is_after_files |= i > 2 && strcmp(argv[i - 2], "--files") == 0;
+            options->is_after_pattern |= i > 2 && takes_pattern(options, argv[i - 2]);
             options->arguments[options->n_arguments++] = word;
         }
         i += n_used;

@@ -58,7 +58,7 @@ struct gn_options {
     int n_arguments;
     bool wants_help;
     bool wants_version;
-    bool is_after_files; // a word stands where the shell's second match of --files would
+    bool is_after_pattern; // a word stands where the shell's second match of a pattern would
 };
 
 /** Length of "room" in "room *", of "server" in "server". */

@@ -43,6 +43,7 @@ WRONG = (
     (['view', '--sequence', 'a', '--out'], ['--out lacks its value']),
     (['view', '--sequence', 'a', '--out', 'o', 'p'], ['unexpected p']),
     (['view', '--files', 'a', 'b', '--out', 'o'], ['unexpected b (put a pattern in quotes)']),
+    (['calibrate', 'response', '--chart', 'a', 'b', '--out', 'o'], ['unexpected b (put a pattern in quotes)']),
     (['view', '--files', 'a', '--camera', 'c'], ['--out DIR', '--window']),
     (['view', '--sequence', 'a', '--out', 'o', '--record-max', '1MiB'], ['--record FILE']),
     (['probe', '--files', 'a', '--record-max', '1MiB'], ['--record FILE']),
