@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "client/calibrate/solve.h"
+#include "common/compare.h"
 
 /* L*a*b*, D50, 2 degrees. Source: X-Rite, "New color specifications for ColorChecker SG and Classic
  * charts", the values for charts made before November 2014. */
@@ -91,12 +92,6 @@ static int find_homography(const struct gn_chart_place *place, double h[9], doub
     return 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Median, 1.4826 times the median deviation, share clipped; values are sorted and overwritten. */
 static void summarise(float *values, int n, double rail, double *out_code, double *out_spread,
                       double *out_clipped)
@@ -104,7 +99,7 @@ static void summarise(float *values, int n, double rail, double *out_code, doubl
     int clipped = 0;
     for (int i = 0; i < n; i++)
         clipped += (double)values[i] < rail || (double)values[i] > 1 - rail;
-    qsort(values, (size_t)n, sizeof(*values), compare_floats);
+    qsort(values, (size_t)n, sizeof(*values), gn_compare_floats);
     double median = ((double)values[n / 2] + (double)values[(n - 1) / 2]) / 2;
     // Codes are steps: the mean of the middle half is finer than the median, and as robust here.
     double sum = 0;
@@ -113,7 +108,7 @@ static void summarise(float *values, int n, double rail, double *out_code, doubl
         sum += (double)values[i];
     for (int i = 0; i < n; i++)
         values[i] = (float)fabs((double)values[i] - median);
-    qsort(values, (size_t)n, sizeof(*values), compare_floats);
+    qsort(values, (size_t)n, sizeof(*values), gn_compare_floats);
     *out_code = sum / (high - low);
     *out_spread = 1.4826 * (double)values[n / 2];
     *out_clipped = (double)clipped / n;
@@ -334,12 +329,6 @@ static void find_errors(const double device[72], struct gn_chart_matrix *m)
     }
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Marks what lies off by more than 4 robust deviations, but not below 10 %. */
 static int leave_out(const struct gn_chart_matrix *m, bool is_used[24])
 {
@@ -348,7 +337,7 @@ static int leave_out(const struct gn_chart_matrix *m, bool is_used[24])
     for (int j = 0; j < 24; j++)
         if (is_used[j])
             sorted[n++] = m->error[j];
-    qsort(sorted, (size_t)n, sizeof(double), compare_doubles);
+    qsort(sorted, (size_t)n, sizeof(double), gn_compare_doubles);
     double bound = fmax(4 * 1.4826 * sorted[n / 2], 0.1);
     for (int j = 0; j < 24; j++) {
         if (is_used[j] && m->error[j] > bound) {

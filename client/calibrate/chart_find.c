@@ -15,6 +15,7 @@
 
 #include "client/calibrate/chart.h"
 #include "client/calibrate/solve.h"
+#include "common/compare.h"
 
 enum {
     MAX_SIDE = 900, // px of the picture that is looked in
@@ -79,12 +80,6 @@ static int make_plane(const struct gn_image *image, int factor, struct plane *ou
     return 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Levels that part the pixels into equal shares. */
 static int find_levels(const struct plane *p, float levels[LEVELS])
 {
@@ -93,7 +88,7 @@ static int find_levels(const struct plane *p, float levels[LEVELS])
     if (!sorted)
         return -ENOMEM;
     memcpy(sorted, p->values, n * sizeof(*sorted));
-    qsort(sorted, n, sizeof(*sorted), compare_floats);
+    qsort(sorted, n, sizeof(*sorted), gn_compare_floats);
     for (size_t i = 0; i < LEVELS; i++)
         levels[i] = sorted[(n - 1) * (i + 1) / (LEVELS + 1)];
     free(sorted);

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
+
 #define MAX_CLIPPED 0.02
 /* What a patch's code is not known better than, whatever its pixels say: drift of lamp and lens. */
 #define LOG_FLOOR 5e-4    // share of full scale
@@ -132,12 +134,6 @@ static int find_unit(const struct fit *f, double *out_unit, struct gn_error *out
     return 0;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Without times: a patch's light is the median of what its pictures say. */
 static double get_median_light(const struct fit *f, const struct gn_chart_response *r, int patch,
                                int channel)
@@ -150,7 +146,7 @@ static double get_median_light(const struct fit *f, const struct gn_chart_respon
             isfinite(r->time[p->shot]))
             values[n++] = gn_curve_decode(&r->curve, p->code) / r->time[p->shot];
     }
-    qsort(values, (size_t)n, sizeof(double), compare_doubles);
+    qsort(values, (size_t)n, sizeof(double), gn_compare_doubles);
     return n > 0 ? (values[n / 2] + values[(n - 1) / 2]) / 2 : NAN;
 }
 

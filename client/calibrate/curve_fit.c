@@ -9,14 +9,9 @@
 
 #include "client/calibrate/curve_search.h"
 #include "client/calibrate/solve.h"
+#include "common/compare.h"
 
 #define MAX_B_ERROR 0.05
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* The robust deviation of the residuals: 1.4826 times the median of their sizes. */
 static double get_spread(struct gn_curve_work *f)
@@ -29,7 +24,7 @@ static double get_spread(struct gn_curve_work *f)
                 s->weight *
                 fabs(s->code - gn_curve_predict(f, f->theta, gn_curve_get_light(s, f->u)));
     }
-    qsort(f->slope, (size_t)n, sizeof(double), compare_doubles);
+    qsort(f->slope, (size_t)n, sizeof(double), gn_compare_doubles);
     return n > 0 ? 1.4826 * f->slope[n / 2] : 0;
 }
 
@@ -66,7 +61,7 @@ static void centre_groups(struct gn_curve_work *f)
             if (s->weight > 0 && x > 0)
                 f->rows[n++] = log(x) - s->offset;
         }
-        qsort(f->rows, (size_t)n, sizeof(double), compare_doubles);
+        qsort(f->rows, (size_t)n, sizeof(double), gn_compare_doubles);
         if (n > 0)
             f->u[g] = (f->rows[n / 2] + f->rows[(n - 1) / 2]) / 2;
     }

@@ -11,6 +11,7 @@
 #include "client/calibrate/solve.h"
 #include "client/track/rotation.h"
 #include "client/vision/markers.h"
+#include "common/compare.h"
 #include "common/vec3.h"
 
 #define DEGREE 57.29577951308232
@@ -209,19 +210,13 @@ static int guess(const struct gn_probe_sighting *s, struct gn_pose out[static 2]
     return n < 0 ? n : n_out;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /** Weights 1 or 0 by how far each is off; returns how many are left. scratch[n]. */
 static int choose(const struct problem *p, const struct gn_pose *pose, double *scratch)
 {
     int n_used = 0;
     for (int i = 0; i < p->n; i++)
         scratch[i] = p->s[i].rms_rad = sqrt(get_mean_square(pose, &p->s[i]));
-    qsort(scratch, (size_t)p->n, sizeof(*scratch), compare_doubles);
+    qsort(scratch, (size_t)p->n, sizeof(*scratch), gn_compare_doubles);
     double median = scratch[(p->n - 1) / 2];
     for (int i = 0; i < p->n; i++) {
         struct gn_probe_sighting *s = &p->s[i];

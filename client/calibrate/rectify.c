@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "common/compare.h"
 #include "common/vec3.h"
 
 #define PI 3.14159265358979323846
@@ -89,12 +90,6 @@ static float sample(const struct gn_image *light, double x, double y)
     return isfinite(v) ? (float)fmax(v, 0) : -1;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /** From the darkest to the lightest percent of what was taken in the middle; sorts into scratch. */
 static void find_range(const float *taken, int side, double core, float *scratch, double *out_low,
                        double *out_high)
@@ -104,7 +99,7 @@ static void find_range(const float *taken, int side, double core, float *scratch
         for (int x = from; x < side - from; x += stride)
             if (taken[y * side + x] >= 0)
                 scratch[n++] = taken[y * side + x];
-    qsort(scratch, (size_t)n, sizeof(*scratch), compare_floats);
+    qsort(scratch, (size_t)n, sizeof(*scratch), gn_compare_floats);
     *out_high = n > 0 ? headroom * (double)scratch[n - 1 - n / 100] : 0;
     *out_low = n > 0 ? fmax((double)scratch[n / 100], *out_high / max_range) : 0;
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "client/calibrate/solve.h"
+#include "common/compare.h"
 
 #define PI 3.14159265358979323846
 #define MAX_RAYS 720
@@ -170,12 +171,6 @@ static bool sample(const struct gn_image *image, double x, double y, double *out
     return true;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Dark and typical code: the 2nd percentile and the median of what is above twice that. */
 static int find_levels(const struct gn_image *image, double *out_dark, double *out_typical)
 {
@@ -185,7 +180,7 @@ static int find_levels(const struct gn_image *image, double *out_dark, double *o
         return -ENOMEM;
     for (int i = 0; i < n; i++)
         values[i] = isfinite(image->data[i]) ? image->data[i] : 0;
-    qsort(values, (size_t)n, sizeof(*values), compare_floats);
+    qsort(values, (size_t)n, sizeof(*values), gn_compare_floats);
     *out_dark = (double)values[n / 50];
     double bound = *out_dark + 0.02 * ((double)values[n - 1 - n / 100] - *out_dark);
     while (above < n && (double)values[above] <= bound)

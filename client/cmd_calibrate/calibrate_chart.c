@@ -100,16 +100,6 @@ static bool find_by_opencv(const struct gn_image *image, struct gn_chart_place *
     return is_found;
 }
 
-/* The channels' mean. */
-static int make_gray(const struct gn_image *image, struct gn_image *out)
-{
-    int err = gn_image_init(out, image->width, image->height, 1);
-    for (long i = 0; !err && i < (long)image->width * image->height; i++)
-        for (int c = 0; c < image->channels; c++)
-            out->data[i] += image->data[i * image->channels + c] / (float)image->channels;
-    return err;
-}
-
 /* OpenCV compares colours: under light of one band it takes a gray picture only. The grid of the
  * patches does where it sees none, or is not in the build. */
 static int find_place(struct run *run, struct gn_error *out_error)
@@ -118,7 +108,7 @@ static int find_place(struct run *run, struct gn_error *out_error)
     const char *by = "OpenCV";
     int ret = 1;
     if (!find_by_opencv(&run->mean, &run->place)) {
-        if (make_gray(&run->mean, &gray) < 0)
+        if (gn_calibrate_make_gray(&run->mean, &gray) < 0)
             return gn_error_set(out_error, -ENOMEM, "out of memory");
         if (!find_by_opencv(&gray, &run->place)) {
             by = "its grid";

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "client/cmd.h"
 #include "client/cmd_calibrate/calibrate_live.h"
 #include "client/cmd_calibrate/calibrate_mean.h"
 #include "client/cmd_calibrate/calibrate_series.h"
-#include "client/cmd.h"
 #include "common/clock.h"
 #include "common/file.h"
 

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/compare.h"
 #include "common/file.h"
 #include "common/image_file.h"
 
@@ -76,12 +77,6 @@ int gn_calibrate_convert(const char *name, const struct gn_image_file *file,
     return 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* The 1st and 99th percentile of some thousands of values. */
 static int find_percentiles(const struct gn_image *image, float *out_low, float *out_high)
 {
@@ -91,7 +86,7 @@ static int find_percentiles(const struct gn_image *image, float *out_low, float 
         return -ENOMEM;
     for (long i = 0; i < n; i += stride)
         values[m++] = isfinite(image->data[i]) ? image->data[i] : 0;
-    qsort(values, (size_t)m, sizeof(*values), compare_floats);
+    qsort(values, (size_t)m, sizeof(*values), gn_compare_floats);
     *out_low = values[m / 100];
     *out_high = values[m - 1 - m / 100];
     free(values);
@@ -178,6 +173,16 @@ int gn_calibrate_read_numbers(const char *option, const char *text, int n, int c
         return gn_error_set(out_error, -EINVAL, "--%s: %d numbers for %d pictures", option, count,
                             n);
     return count;
+}
+
+int gn_calibrate_make_gray(const struct gn_image *image, struct gn_image *out_image)
+{
+    int err = gn_image_init(out_image, image->width, image->height, 1);
+    for (long i = 0; !err && i < (long)image->width * image->height; i++) {
+        const float *p = image->data + i * image->channels;
+        out_image->data[i] = image->channels == 3 ? (p[0] + p[1] + p[2]) / 3 : p[0];
+    }
+    return err;
 }
 
 int gn_calibrate_parse_board(const char *text, struct gn_board *board, struct gn_error *out_error)

@@ -44,6 +44,22 @@ int gn_cmd_calibrate_probe(int argc, char *const argv[]);
         .help = help_text                                                                          \
     }
 
+#define GN_CALIBRATE_FULL_SCALE_OPTION(help_text)                                                  \
+    {                                                                                              \
+        .key = "full-scale", .flag = "full-scale", .type = GN_OPTION_INT, .min = 255,              \
+        .max = 65535, .value_name = "CODE", .help = help_text                                      \
+    }
+#define GN_CALIBRATE_SQUARE_OPTION(help_text)                                                      \
+    {                                                                                              \
+        .key = "square", .flag = "square", .type = GN_OPTION_DOUBLE, .min = 1e-4, .max = 10,       \
+        .default_value = "0.025", .value_name = "METRES", .help = help_text                        \
+    }
+#define GN_CALIBRATE_CHARUCO_OPTION(help_text)                                                     \
+    {                                                                                              \
+        .key = "charuco", .flag = "charuco", .type = GN_OPTION_ENUM,                               \
+        .choices = GN_MARKER_DICTIONARIES, .value_name = "DICTIONARY", .help = help_text           \
+    }
+
 /** How codes of files become floats in [0, 1]. */
 struct gn_calibrate_format {
     int full_scale16;  // largest code of 16-bit files, 0: 65535
@@ -74,6 +90,9 @@ GN_MUST_USE int gn_calibrate_stretch(const struct gn_image *image, struct gn_ima
 /** The same in gray. */
 GN_MUST_USE int gn_calibrate_stretch_gray(const struct gn_image *image,
                                           struct gn_image8 *out_image);
+
+/** The mean of the channels, in one. Returns 0 or -ENOMEM; the caller finishes *out_image. */
+GN_MUST_USE int gn_calibrate_make_gray(const struct gn_image *image, struct gn_image *out_image);
 
 /** Sets columns and rows from "10x7", text of --board. Returns 0, or -EINVAL and a sentence. */
 GN_MUST_USE int gn_calibrate_parse_board(const char *text, struct gn_board *board,

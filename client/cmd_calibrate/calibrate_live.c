@@ -7,9 +7,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "client/cmd_calibrate/calibrate_mean.h"
 #include "client/capture/file.h"
 #include "client/capture/video.h"
+#include "client/cmd_calibrate/calibrate_mean.h"
 #include "common/jpeg.h"
 #include "common/png.h"
 

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
+
 /* Codes from this share of full scale on are clipped. */
 #define BRIGHT_RAIL 0.99
 
@@ -139,12 +141,6 @@ int gn_calibrate_mean_get_floats(const struct gn_calibrate_mean *mean, struct gn
     return err;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 void gn_calibrate_mean_describe(const struct gn_calibrate_mean *mean, double *out_span,
                                 double *out_clipped)
 {
@@ -155,7 +151,7 @@ void gn_calibrate_mean_describe(const struct gn_calibrate_mean *mean, double *ou
         sample[n++] = mean->sums[i] / ((double)mean->n * mean->full_scale);
         clipped += sample[n - 1] >= BRIGHT_RAIL;
     }
-    qsort(sample, n, sizeof(*sample), compare_doubles);
+    qsort(sample, n, sizeof(*sample), gn_compare_doubles);
     *out_span = sample[n - 1 - n / 100] - sample[n / 100];
     *out_clipped = clipped / (double)n;
 }

@@ -12,6 +12,7 @@
 #include "client/poses.h"
 #include "client/track/rotation.h"
 #include "client/track/tracker.h"
+#include "common/compare.h"
 
 #define DEGREE 57.29577951308232
 
@@ -76,12 +77,6 @@ static int read_pictures(const struct gn_bodies *bodies, const char *camera_path
     return err ? err : got;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /** How far apart two pictures put the body, turned or moved, in units of their errors. */
 static double get_distance(const struct said *said, int i, int k)
 {
@@ -107,7 +102,7 @@ static double get_distances(const struct said *said, double *out_distance)
     }
     for (int i = 0; i < said->n; i++)
         sorted[i] = out_distance[i] = get_distance(said, middle, i);
-    qsort(sorted, (size_t)said->n, sizeof(*sorted), compare_doubles);
+    qsort(sorted, (size_t)said->n, sizeof(*sorted), gn_compare_doubles);
     return sorted[(said->n - 1) / 2];
 }
 

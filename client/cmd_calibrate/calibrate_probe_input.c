@@ -4,10 +4,10 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "client/cmd.h"
 #include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd_calibrate/calibrate_live.h"
 #include "client/cmd_calibrate/calibrate_probe.h"
-#include "client/cmd.h"
 
 #define MAX_PICTURES 64
 
@@ -53,18 +53,6 @@ static int read_picture(struct gn_probe_run *run, int i, struct gn_image *out,
                            "pictures of the mode that the probe runs in",
                            path, out->width, out->height, p->width, p->height);
         gn_image_finish(out);
-    }
-    return err;
-}
-
-/* One channel: the codes' mean. */
-static int make_gray(const struct gn_image *image, struct gn_image *out)
-{
-    long n = (long)image->width * image->height;
-    int err = gn_image_init(out, image->width, image->height, 1);
-    for (long i = 0; !err && i < n; i++) {
-        const float *p = image->data + i * image->channels;
-        out->data[i] = image->channels == 3 ? (p[0] + p[1] + p[2]) / 3 : p[0];
     }
     return err;
 }
@@ -140,7 +128,7 @@ static int add_picture(struct gn_probe_run *run, int i, struct gn_error *out_err
     struct gn_image image = {0}, gray = {0}, light = {0};
     int err = read_picture(run, i, &image, out_error);
     if (!err &&
-        (make_gray(&image, &gray) < 0 || make_light(run, &image, &light) < 0 ||
+        (gn_calibrate_make_gray(&image, &gray) < 0 || make_light(run, &image, &light) < 0 ||
          keep_largest(&run->first, &gray) < 0 || keep_largest(&run->first_light, &light) < 0))
         err = gn_error_set(out_error, -ENOMEM, "out of memory");
     if (!err && i == 0 && run->step > 0 && !gn_probe_run_has(run, "ball"))

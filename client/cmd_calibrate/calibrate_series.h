@@ -9,8 +9,8 @@
 
 #include <stdbool.h>
 
-#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/capture/file.h"
+#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/live.h"
 #include "common/error.h"
 #include "common/image_file.h"

@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd.h"
+#include "client/cmd_calibrate/calibrate_input.h"
 #include "common/text.h"
 #include "proto/attr.h"
 

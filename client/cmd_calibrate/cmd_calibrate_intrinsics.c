@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include "client/calibrate/device_file.h"
-#include "client/cmd_calibrate/calibrate_input.h"
-#include "client/cmd_calibrate/calibrate_collect.h"
 #include "client/cmd.h"
+#include "client/cmd_calibrate/calibrate_collect.h"
+#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/feature.h"
 #include "client/vision/boards.h"
 #include "client/vision/markers.h"
@@ -47,21 +47,10 @@ static const struct gn_option option_table[] = {
      .is_required = true,
      .help = "Squares of the board, columns by rows, the outermost too: 10x7 has 9 x 6 inner "
              "corners."},
-    {.key = "square",
-     .flag = "square",
-     .type = GN_OPTION_DOUBLE,
-     .min = 1e-4,
-     .max = 10,
-     .default_value = "0.025",
-     .value_name = "METRES",
-     .help = "Side of a square. The intrinsics do not depend on it."},
-    {.key = "charuco",
-     .flag = "charuco",
-     .type = GN_OPTION_ENUM,
-     .choices = GN_MARKER_DICTIONARIES,
-     .value_name = "DICTIONARY",
-     .help = "The board is a ChArUco board with markers of this dictionary, as OpenCV 4.6 draws "
-             "it; it may be seen in part. Without: a plain chessboard, seen whole."},
+    GN_CALIBRATE_SQUARE_OPTION("Side of a square. The intrinsics do not depend on it."),
+    GN_CALIBRATE_CHARUCO_OPTION(
+        "The board is a ChArUco board with markers of this dictionary, as OpenCV 4.6 draws it; it "
+        "may be seen in part. Without: a plain chessboard, seen whole."),
     {.key = "marker",
      .flag = "marker",
      .type = GN_OPTION_DOUBLE,

@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "client/calibrate/views.h"
-#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd.h"
+#include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd_calibrate/sheet.h"
 #include "client/vision/markers.h"
 #include "proto/attr.h"
@@ -22,20 +22,8 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_STRING,
      .value_name = "CxR",
      .help = "A chessboard of so many squares, columns by rows, for gnomon calibrate intrinsics."},
-    {.key = "square",
-     .flag = "square",
-     .type = GN_OPTION_DOUBLE,
-     .min = 1e-4,
-     .max = 10,
-     .default_value = "0.025",
-     .value_name = "METRES",
-     .help = "Side of its squares."},
-    {.key = "charuco",
-     .flag = "charuco",
-     .type = GN_OPTION_ENUM,
-     .choices = GN_MARKER_DICTIONARIES,
-     .value_name = "DICTIONARY",
-     .help = "With markers of this dictionary in its white squares."},
+    GN_CALIBRATE_SQUARE_OPTION("Side of its squares."),
+    GN_CALIBRATE_CHARUCO_OPTION("With markers of this dictionary in its white squares."),
     {.key = "marker",
      .flag = "marker",
      .type = GN_OPTION_STRING,

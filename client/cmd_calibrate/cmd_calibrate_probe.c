@@ -11,10 +11,10 @@
 #include <unistd.h>
 
 #include "client/calibrate/device_file.h"
+#include "client/cmd.h"
 #include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd_calibrate/calibrate_live.h"
 #include "client/cmd_calibrate/calibrate_probe.h"
-#include "client/cmd.h"
 #include "common/device_json.h"
 #include "proto/attr.h"
 
@@ -25,20 +25,11 @@ static const struct gn_option option_table[] = {
      .value_name = "PATTERN",
      .help = "The probe's pictures: a folder, a file or a pattern; the probe at rest."},
     GN_CALIBRATE_LIVE_OPTIONS,
-    {.key = "frames",
-     .flag = "frames",
-     .type = GN_OPTION_INT,
-     .min = 1,
-     .max = 10000,
-     .value_name = "N",
-     .help = "Camera or video: take the mean of so many pictures; default 1. In the lamps' file "
-             "it is called camera."},
-    {.key = "out",
-     .flag = "out",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .is_required = true,
-     .help = "probe.json. What it says already (projection, response) is used, and stays."},
+    GN_CALIBRATE_FRAMES_OPTION(
+        "Camera or video: take the mean of so many pictures; default 1. In the lamps' file it is "
+        "called camera."),
+    GN_CALIBRATE_OUT_OPTION(
+        "probe.json. What it says already (projection, response) is used, and stays."),
     {.key = "projection",
      .flag = "projection",
      .type = GN_OPTION_ENUM,
@@ -75,7 +66,8 @@ static const struct gn_option option_table[] = {
      .value_name = "FILE",
      .help = "Lamps of known direction, a line for each: NAME X Y Z, NAME the picture's file (or * "
              "for all), X Y Z the way from the probe to the lamp in the marker's frame, of any "
-             "length. Two directions at least; which spot is which lamp is found."},
+             "length. Two at least, three where they share a picture; which spot is which lamp is "
+             "found."},
     {.key = "markers",
      .flag = "markers",
      .type = GN_OPTION_STRING,
@@ -122,20 +114,12 @@ static const struct gn_option option_table[] = {
      .default_value = "4",
      .value_name = "DEGREES",
      .help = "How far spots may lie from their lamps when they are matched."},
-    {.key = "full-scale",
-     .flag = "full-scale",
-     .type = GN_OPTION_INT,
-     .min = 255,
-     .max = 65535,
-     .value_name = "CODE",
-     .help = "Largest code of 16-bit files. Default 4095 where FILE says log12, else 65535."},
-    {.key = "picture",
-     .flag = "picture",
-     .type = GN_OPTION_STRING,
-     .value_name = "FILE",
-     .help = "A PNG of the pictures with what was found: circle, mask, spots and markers (green; "
-             "yellow: seen but not used), where they should be (red dots), the world's axes. "
-             "Written when nothing can be measured, too."},
+    GN_CALIBRATE_FULL_SCALE_OPTION(
+        "Largest code of 16-bit files. Default 4095 where FILE says log12, else 65535."),
+    GN_CALIBRATE_PICTURE_OPTION(
+        "A PNG of the pictures with what was found: circle, mask, spots and markers (green; "
+        "yellow: seen but not used), where they should be (red dots), the world's axes. Written "
+        "when nothing can be measured, too."),
 };
 
 static const struct gn_program program = {

@@ -7,8 +7,8 @@
 
 #include "client/calibrate/chart_response.h"
 #include "client/calibrate/stack.h"
-#include "client/cmd_calibrate/calibrate_response.h"
 #include "client/cmd.h"
+#include "client/cmd_calibrate/calibrate_response.h"
 #include "proto/attr.h"
 
 static const struct gn_option option_table[] = {
@@ -65,15 +65,9 @@ static const struct gn_option option_table[] = {
      .value_name = "LIST",
      .help = "Chart: x,y of the centres of the patches dark skin, bluish green, black, white, in "
              "px. Without, the chart is looked for."},
-    {.key = "full-scale",
-     .flag = "full-scale",
-     .type = GN_OPTION_INT,
-     .min = 255,
-     .max = 65535,
-     .value_name = "CODE",
-     .help =
-         "Largest code: 4095 for 12-bit sensors; default 65535 of 16-bit files, and that of its "
-         "pixel format of a camera."},
+    GN_CALIBRATE_FULL_SCALE_OPTION(
+        "Largest code: 4095 for 12-bit sensors; default 65535 of 16-bit files, and that of its "
+        "pixel format of a camera."),
     {.key = "bits",
      .flag = "bits",
      .type = GN_OPTION_INT,

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/lib/client.h"
 #include "client/cmd_replay/playback_internal.h"
+#include "client/lib/client.h"
 
 /** What a frame waits for its light at most, when that is pinned. */
 #define PINNED_WAIT_MS GN_LIMIT_LIGHTING_WAIT_MS

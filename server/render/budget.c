@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
 #include "proto/attr.h"
 
 /** Frames until times are predicted, and until rises have to rest. */
@@ -200,18 +201,12 @@ static double predict_error(const struct gn_budget *b, const struct gn_budget_se
 
 /* The past */
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /** The value of that rank, 0 the least. */
 static double get_ranked(const double *values, int n, int rank)
 {
     double sorted[GN_BUDGET_KEPT];
     memcpy(sorted, values, (size_t)n * sizeof(*values));
-    qsort(sorted, (size_t)n, sizeof(*sorted), compare_doubles);
+    qsort(sorted, (size_t)n, sizeof(*sorted), gn_compare_doubles);
     return sorted[rank];
 }
 

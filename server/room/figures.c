@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
+
 const double gn_figures_bounds_ms[GN_FIGURES_BUCKETS] = {2,   5,   10,  16.7, 33.3, 50,
                                                          100, 200, 500, 1000, 5000, 20000};
 
@@ -27,19 +29,13 @@ void gn_time_window_add(struct gn_time_window *window, double ms)
         window->n++;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 double gn_time_window_get(const struct gn_time_window *window, double share)
 {
     if (window->n == 0)
         return 0;
     double sorted[GN_WINDOW];
     memcpy(sorted, window->ms, (size_t)window->n * sizeof(sorted[0]));
-    qsort(sorted, (size_t)window->n, sizeof(sorted[0]), compare_doubles);
+    qsort(sorted, (size_t)window->n, sizeof(sorted[0]), gn_compare_doubles);
     int rank = (int)ceil(share * window->n);
     return sorted[(rank < 1 ? 1 : rank) - 1];
 }

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 
 #include "common/clock.h"
+#include "common/compare.h"
 #include "common/pose.h"
 #include "tests/meshes.h"
 
@@ -90,13 +91,6 @@ static long trace_packets(const struct gn_rt *rt, enum gn_rt_set set,
     return n;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a;
-    double y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static long measure(const char *name, const struct gn_rt *rt, enum gn_rt_set set,
                     const struct gn_rt_packet *packets,
                     long (*trace)(const struct gn_rt *, enum gn_rt_set,
@@ -110,7 +104,7 @@ static long measure(const char *name, const struct gn_rt *rt, enum gn_rt_set set
         int64_t ns = gn_clock_get_monotonic_ns() - start;
         rates[i] = 1e3 * N_PACKETS * GN_RT_PACKET / (double)ns;
     }
-    qsort(rates, N_ROUNDS, sizeof(rates[0]), compare_doubles);
+    qsort(rates, N_ROUNDS, sizeof(rates[0]), gn_compare_doubles);
     printf("%-34s median %6.2f Mray/s  [%.2f, %.2f]  occluded %.1f %%\n", name, rates[N_ROUNDS / 2],
            rates[0], rates[N_ROUNDS - 1], 100.0 * (double)n_occluded / (N_PACKETS * GN_RT_PACKET));
     return n_occluded;

@@ -10,17 +10,11 @@
 #include <stdlib.h>
 
 #include "common/clock.h"
+#include "common/compare.h"
 #include "common/pose.h"
 #include "tests/meshes.h"
 
 #define N_ROUNDS 101
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a;
-    double y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static struct gn_pose get_pose(int i)
 {
@@ -56,7 +50,7 @@ static double measure_move(const struct gn_mesh *mesh, int n_objects)
     gn_rt_destroy(&posed);
     gn_rt_destroy(&source);
     free(poses);
-    qsort(us, N_ROUNDS, sizeof(us[0]), compare_doubles);
+    qsort(us, N_ROUNDS, sizeof(us[0]), gn_compare_doubles);
     return us[N_ROUNDS / 2];
 }
 

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
 #include "common/image_file.h"
 #include "proto/attr.h"
 #include "tests/random.h"
@@ -107,12 +108,6 @@ struct radiance_error {
     double decades;            // of the light compared
 };
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Light that some picture shows between the rails. */
 static struct radiance_error get_radiance_error(const struct gn_image *map,
                                                 const struct gn_image *merged, int curve,
@@ -131,11 +126,11 @@ static struct radiance_error get_radiance_error(const struct gn_image *map,
         most = fmax(most, truth);
         ratios[used++] = (float)((double)merged->data[i] / truth);
     }
-    qsort(ratios, (size_t)used, sizeof(*ratios), compare_floats);
+    qsort(ratios, (size_t)used, sizeof(*ratios), gn_compare_floats);
     double scale = (double)ratios[used / 2];
     for (long i = 0; i < used; i++)
         ratios[i] = (float)fabs((double)ratios[i] / scale - 1);
-    qsort(ratios, (size_t)used, sizeof(*ratios), compare_floats);
+    qsort(ratios, (size_t)used, sizeof(*ratios), gn_compare_floats);
     struct radiance_error e = {(double)ratios[used * 95 / 100], (double)ratios[used - 1],
                                (double)ratios[used / 2], log10(most / least)};
     free(ratios);

@@ -9,17 +9,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "common/compare.h"
 #include "server/render/budget.h"
 #include "tests/bench/rig_frame.h"
 #include "tests/bench/timing.h"
 
 enum { FRAMES = 120, FIRST = 40, LIGHTS = 256 };
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /** About the object, a little. */
 static void move(struct gn_bench_rig *rig, int width, int frame)
@@ -89,7 +84,7 @@ static void run(struct gn_bench_rig *rig, int width, double budget_ms)
         }
         run_frame(rig, &light, &budget, sums, width, budget_ms, i, &choice, &ms[i]);
     }
-    qsort(ms + FIRST, FRAMES - FIRST, sizeof(*ms), compare_doubles);
+    qsort(ms + FIRST, FRAMES - FIRST, sizeof(*ms), gn_compare_doubles);
     printf("%5d %6.0f  %-9s %6d %5d %5d %11.1f %8.1f %6.1f %5d/%d %9d %12.4f %10.4f\n", width,
            budget_ms, gn_budget_get_verdict_name(choice.verdict), choice.setting.n_lights,
            choice.setting.grid, choice.setting.shadow_step, choice.predicted_ms,

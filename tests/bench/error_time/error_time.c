@@ -22,6 +22,7 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include "common/compare.h"
 #include "tests/bench/error_time/metrics.h"
 #include "tests/bench/error_time/sequence.h"
 #include "tests/bench/error_time/settings.h"
@@ -87,12 +88,6 @@ static double get_cpu_ms(void)
     return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void stop(struct stopwatch *watch)
 {
     double ms = get_cpu_ms() - watch->start;
@@ -111,7 +106,7 @@ static bool is_enough(const struct bench *b, const struct stopwatch *watch)
 static struct timing sum_up(struct stopwatch *watch)
 {
     int n = watch->n;
-    qsort(watch->ms, (size_t)n, sizeof(watch->ms[0]), compare_doubles);
+    qsort(watch->ms, (size_t)n, sizeof(watch->ms[0]), gn_compare_doubles);
     return (struct timing){watch->ms[n / 2], watch->ms[3 * n / 4] - watch->ms[n / 4]};
 }
 

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/compare.h"
 #include "tests/bench/error_time/flip.h"
 
 #define MASK_BELOW 0.995f
@@ -44,12 +45,6 @@ void gn_bench_compose(const struct gn_bench_picture *reference, const struct gn_
     }
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /** Over the pixels of touched; terms has room for three numbers for each pixel. */
 static void measure_relative(const struct gn_image *reference, const struct gn_image *test,
                              const bool *touched, double *terms, struct gn_bench_errors *out)
@@ -70,7 +65,7 @@ static void measure_relative(const struct gn_image *reference, const struct gn_i
         double r = reference->data[i] / mean, d = test->data[i] / mean - r;
         terms[n++] = d * d / (r * r + REL_EPSILON);
     }
-    qsort(terms, n, sizeof(*terms), compare_doubles);
+    qsort(terms, n, sizeof(*terms), gn_compare_doubles);
     size_t n_kept = n - (size_t)((double)n * TRIMMED_SHARE);
     for (size_t i = 0; i < n; i++) {
         sum += terms[i];

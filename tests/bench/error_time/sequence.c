@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "common/clock.h"
+#include "common/compare.h"
 #include "tests/bench/error_time/metrics.h"
 
 #define FRAME_NS (GN_NS_PER_S / 30)
@@ -145,12 +146,6 @@ static double get_flicker(const struct gn_bench_streams *streams, const struct t
     return right > 0 ? wrong / right : 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /** Overwrites the first frame. */
 static double get_noise(struct take *take)
 {
@@ -164,7 +159,7 @@ static double get_noise(struct take *take)
         }
         take->frame[0][p] = (float)sqrt(squares / (GN_BENCH_FRAMES - 1));
     }
-    qsort(take->frame[0], take->n, sizeof(float), compare_floats);
+    qsort(take->frame[0], take->n, sizeof(float), gn_compare_floats);
     return take->frame[0][take->n * 95 / 100];
 }
 
