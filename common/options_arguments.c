@@ -77,14 +77,15 @@ static int find_flag(struct gn_options *options, const char *text, struct flag *
     *out_flag = (struct flag){.index = -1};
     if (strchr(text, '.') != NULL)
         return find_named_flag(options, text, out_flag, out_error);
+    const char *negated = strncmp(text, "no-", 3) == 0 ? text + 3 : NULL;
     for (int i = 0; i < options->program->n_options; i++) {
         const struct gn_option *option = &options->program->options[i];
         char flag[GN_OPTIONS_MAX_LABEL];
         if (gn_section_is_named(option->section))
             continue;
         gn_option_get_flag(option, "", sizeof(flag), flag);
-        bool is_negated = option->type == GN_OPTION_BOOL && strncmp(text, "no-", 3) == 0 &&
-                          strcmp(text + 3, flag) == 0;
+        bool is_negated =
+            option->type == GN_OPTION_BOOL && negated != NULL && strcmp(negated, flag) == 0;
         if (!is_negated && strcmp(text, flag) != 0)
             continue;
         const char *section = option->section;
