@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -29,11 +30,12 @@ struct gn_compositor {
     struct gn_response curve; // that these are of; of type TABLE: of none
     struct gn_encoder encoder;
     float linear[256];
+    atomic_uint n_covered; // pixels of the last picture; relaxed, read after its work has ended
 };
 
 /* One picture's work, shared by all workers. */
 struct job {
-    const struct gn_compositor *compositor;
+    struct gn_compositor *compositor;
     const struct gn_composite_layers *layers;
     int width, height, n_rows; // n_rows: of an item
     struct gn_spread_kernel kernel;
@@ -115,6 +117,15 @@ static bool is_untouched(const struct block *b, int i)
     const float *factor = b->factor + 3 * i, *light = b->light + 3 * i;
     return b->open[i] == 1 && factor[0] == 1 && factor[1] == 1 && factor[2] == 1 && light[0] == 0 &&
            light[1] == 0 && light[2] == 0;
+}
+
+/* How many of the first n pixels show a virtual surface. */
+static unsigned count_covered(const struct block *b, int n)
+{
+    unsigned n_covered = 0;
+    for (int i = 0; i < n; i++)
+        n_covered += b->open[i] < 1;
+    return n_covered;
 }
 
 /* rgb = base * factor + light in device values, where the matrix leaves the channels apart. */
@@ -217,11 +228,13 @@ static void put_linear(const struct job *job, int x, int y, int n, struct block 
     }
 }
 
-/* A row's pixels [begin, end). spread: its row is there, NULL: the layers as they are. */
-static void composite_span(const struct job *job, const struct gn_spread *spread, int y, int begin,
-                           int end)
+/* A row's pixels [begin, end). spread: its row is there, NULL: the layers as they are. Returns how
+ * many show a virtual surface. */
+static unsigned composite_span(const struct job *job, const struct gn_spread *spread, int y,
+                               int begin, int end)
 {
     struct block b = {0};
+    unsigned n_covered = 0;
     for (int x = begin; x < end; x += BLOCK) {
         int n = x + BLOCK <= end ? BLOCK : end - x;
         if (spread)
@@ -230,11 +243,13 @@ static void composite_span(const struct job *job, const struct gn_spread *spread
             continue;
         else
             load_layers(job->layers, x, y, n, &b);
+        n_covered += count_covered(&b, n);
         if (job->codes)
             put_codes8(job, x, y, n, &b);
         else
             put_linear(job, x, y, n, &b);
     }
+    return n_covered;
 }
 
 /* The picture as it is, to be touched where layers are. */
@@ -255,6 +270,7 @@ static void composite_rows(void *context, int item, int worker)
     struct gn_spread *spread = NULL;
     int y = item * job->n_rows, begin = 0, end = job->width;
     int n = y + job->n_rows < job->height ? job->n_rows : job->height - y;
+    unsigned n_covered = 0;
     copy_rows(job, y, n);
     if (job->kernel.radius > 0) {
         spread = &job->compositor->spreads[worker];
@@ -264,8 +280,9 @@ static void composite_rows(void *context, int item, int worker)
     for (int i = 0; i < n; i++) {
         if (spread)
             gn_spread_get_row(spread, &job->kernel, i, &begin, &end);
-        composite_span(job, spread, y + i, begin, end);
+        n_covered += composite_span(job, spread, y + i, begin, end);
     }
+    atomic_fetch_add_explicit(&job->compositor->n_covered, n_covered, memory_order_relaxed);
 }
 
 static bool has_shape(const struct gn_image *image, int width, int height, int channels)
@@ -339,6 +356,7 @@ static int run(struct gn_compositor *compositor, const struct gn_composite_optio
         job->encoder = &compositor->encoder;
         job->linear = compositor->linear;
     }
+    atomic_store_explicit(&compositor->n_covered, 0, memory_order_relaxed);
     gn_pool_run(compositor->pool, (job->height + job->n_rows - 1) / job->n_rows, composite_rows,
                 job);
     return 0;
@@ -373,6 +391,11 @@ void gn_compositor_destroy(struct gn_compositor **compositor)
     free(c->spreads);
     free(c);
     *compositor = NULL;
+}
+
+uint32_t gn_compositor_get_n_covered(const struct gn_compositor *compositor)
+{
+    return atomic_load_explicit(&compositor->n_covered, memory_order_relaxed);
 }
 
 int gn_compositor_put_image8(struct gn_compositor *compositor,

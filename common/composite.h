@@ -40,6 +40,9 @@ struct gn_compositor;
 GN_MUST_USE int gn_compositor_create(struct gn_pool *pool, struct gn_compositor **out_compositor);
 /** NULL-safe; nulls *compositor. */
 void gn_compositor_destroy(struct gn_compositor **compositor);
+/** Pixels of the last picture that show a virtual surface: covered by virtual_rgba, blurred where
+ * the camera blurs. 0 before the first. */
+uint32_t gn_compositor_get_n_covered(const struct gn_compositor *compositor);
 
 /**
  * 8-bit in, 8-bit out, RGB. The camera's response turns codes to radiance and back; a pixel that no

@@ -213,7 +213,7 @@ static int report(struct gn_feed *r, int err, const struct gn_error *error)
     if (v->n_unplaced > 0)
         printf("%ld frames without the world's markers: sent to come back as they are\n",
                v->n_unplaced);
-    if (v->n_empty > 0 && v->n_empty + v->n_unplaced >= v->n_results)
+    if (v->n_empty > 0 && v->n_empty == v->n_wanting)
         printf("no virtual object was in any picture: is the camera where it should be? Sizes and "
                "places are in metres\n");
     gn_poses_print(v->poses, stdout);

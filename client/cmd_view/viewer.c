@@ -78,25 +78,6 @@ static void print_result(const struct gn_viewer *v, const struct gn_msg_result *
     printf("\n");
 }
 
-/** Why a pass was left out; NULL: it was not. */
-static const char *find_left_out(const struct gn_msg_receipt *r, const char *pass)
-{
-    for (size_t i = 0; i < r->left_out_count; i++)
-        if (strcmp(r->left_out[i].pass, pass) == 0)
-            return r->left_out[i].why;
-    return NULL;
-}
-
-/** Whether the server found no virtual object in the picture: neither of any material in a pixel,
- * nor in view at all. Passes left out for another reason tell nothing. */
-static bool is_empty(const struct gn_msg_receipt *r)
-{
-    const char *why = find_left_out(r, "shade");
-    return why && find_left_out(r, "mirror") && find_left_out(r, "glossy") &&
-           (strcmp(why, "no pixel shows a diffuse virtual surface") == 0 ||
-            strcmp(why, "no virtual object in view") == 0);
-}
-
 static int take_result(struct gn_viewer *v, const struct gn_viewer_pending *p,
                        const struct gn_client_event *event, struct gn_error *out_error)
 {
@@ -106,7 +87,9 @@ static int take_result(struct gn_viewer *v, const struct gn_viewer_pending *p,
                                                latency_ms, out_error)
                         : 0;
     v->n_results++;
-    v->n_empty += is_empty(&result->receipt);
+    v->n_wanting += p->wants_virtual;
+    v->n_empty += p->wants_virtual && result->receipt.has_virtual_pixels &&
+                  result->receipt.virtual_pixels == 0;
     v->n_dropped_since = 0;
     v->latency_sum_ms += latency_ms;
     v->latency_max_ms = fmax(v->latency_max_ms, latency_ms);

@@ -23,6 +23,7 @@
 struct gn_viewer_pending {
     uint64_t id;
     int64_t sent_ns;
+    bool wants_virtual; // virtual objects are to be in the picture
     char name[GN_FILE_NAME_BYTES];
 };
 
@@ -43,7 +44,8 @@ struct gn_viewer {
     int n_outstanding;
     struct gn_viewer_pending pending[GN_VIEWER_MAX_OUTSTANDING];
     long n_results, n_dropped;
-    long n_empty;        // results; whose pictures show no virtual object though asked for
+    long n_wanting;      // results; in which virtual objects were asked for
+    long n_empty;        // of these: whose pictures show none
     long n_lost;         // frames, with the server
     int n_reconnected;   // times
     int n_dropped_since; // frames since the last result

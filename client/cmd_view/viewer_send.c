@@ -84,7 +84,8 @@ int gn_viewer_send(struct gn_feed *r, const struct gn_capture *capture, struct g
     if (err)
         return err;
     set_light_wanted(v, &frame);
-    *p = (struct gn_viewer_pending){.id = frame.id, .sent_ns = gn_client_now_ns()};
+    *p = (struct gn_viewer_pending){
+        .id = frame.id, .sent_ns = gn_client_now_ns(), .wants_virtual = !frame.no_virtual};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
     err = gn_client_send_frame(r->client, &frame, capture->data, capture->data_bytes);
     if (err) {

@@ -206,6 +206,8 @@ static void print_receipt(struct block *b, const struct gn_overlay_figures *f)
     char text[256];
     print_latency(b, f);
     print_light(b, r);
+    if (r->has_virtual_pixels)
+        print(b, "objects", "in %u pixels", r->virtual_pixels);
     if (r->estimated_error >= 0)
         print(b, "error", "%.4f of the shadow, estimated", (double)r->estimated_error);
     else

@@ -152,11 +152,13 @@ static json_t *make_receipt(const struct gn_msg_receipt *r)
         refined =
             json_pack("{s:I, s:o}", "passes", (json_int_t)r->refined_passes, "error",
                       r->refined_error >= 0 ? json_real((double)r->refined_error) : json_null());
-    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o, s:o, s:o}", "stages_ms", stages,
+    json_t *shown =
+        r->has_virtual_pixels ? json_integer((json_int_t)r->virtual_pixels) : json_null();
+    return json_pack("{s:o, s:I, s:f, s:i, s:o, s:o, s:o, s:o, s:o, s:o}", "stages_ms", stages,
                      "lighting_sequence", (json_int_t)r->lighting_sequence, "lighting_age_ms",
                      (double)r->lighting_age_ms, "lights", (int)r->lights_used, "rays", rays,
                      "left_out", left_out, "estimated_error", error, "budget", make_budget(r),
-                     "refined", refined);
+                     "refined", refined, "virtual_pixels", shown);
 }
 
 /** Appends one frame to view.json; takes it. */

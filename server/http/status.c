@@ -176,7 +176,7 @@ static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
     // clang-format off
     return json_pack(
         "{s:i, s:i, s:s, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f},"
-        " s:I, s:f, s:I, s:{s:I, s:I, s:I}, s:f, s:o, s:{s:i, s:f}, s:o}",
+        " s:I, s:f, s:I, s:{s:I, s:I, s:I}, s:f, s:o, s:{s:i, s:f}, s:I, s:o}",
         "width", f->last_width, "height", f->last_height,
         "quality", (unsigned)r->quality < 3 ? qualities[r->quality] : "?",
         "ms", "queue", r->queue_ms, "decode", r->decode_ms, "plan", r->plan_ms,
@@ -189,7 +189,7 @@ static json_t *make_receipt(const struct gn_room_figures *f, bool *is_short)
             "secondary", (json_int_t)r->rays_secondary,
         "estimated_error", r->estimated_error, "budget", make_budget(f),
         "refined", "passes", (int)r->refined_passes, "error", r->refined_error,
-        "left_out", left_out);
+        "virtual_pixels", (json_int_t)r->virtual_pixels, "left_out", left_out);
     // clang-format on
 }
 

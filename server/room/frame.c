@@ -343,7 +343,10 @@ static int draw_view(struct work *w, size_t index, struct frame_buffers *b, stru
     w->result->receipt.composite_ms += (float)lap(&at);
     if (rc == -ENOMEM)
         return gn_error_set(error, rc, "out of memory for the composite");
-    return rc < 0 ? gn_error_set(error, rc, "the layers do not fit the picture") : 0;
+    if (rc < 0)
+        return gn_error_set(error, rc, "the layers do not fit the picture");
+    w->result->receipt.virtual_pixels += gn_compositor_get_n_covered(m->compositor);
+    return 0;
 }
 
 /** One view from picture to its place in the payload. */
@@ -429,6 +432,7 @@ static void start_receipt(struct gn_msg_receipt *receipt, const struct gn_frame_
         (float)gn_clock_get_ms_between(light->capture_time_ns, job->frame.capture_time_ns);
     receipt->estimated_error = -1;
     receipt->refined_error = -1;
+    receipt->has_virtual_pixels = true;
     receipt->quality = job->frame.quality;
 }
 

@@ -100,6 +100,21 @@ def test_frames():
         assert len(os.listdir(bench.at('out'))) == 7  # and nothing else
 
 
+def test_nothing_virtual_is_told():
+    """Where no picture shows an object though asked for, moving or at rest: by the pixels counted."""
+    none = 'no virtual object was in any picture'
+    with Daemon() as daemon, Bench() as bench:
+        probe(daemon, bench).succeed()
+        bench.write('up.json', json.dumps({**CAMERA, 'world_from_camera': [
+            1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2, 0, 0, 0, 1]}).encode())
+        for camera, more, pixels in (('up.json', (), range(1)), ('camera.json', (), range(9, WIDTH * HEIGHT // 2)),
+                                     ('camera.json', ('--show', 'shadow'), range(1))):
+            out = view(daemon, bench, *more, camera=camera).succeed()
+            counts = [frame['receipt']['virtual_pixels'] for frame in read_report(bench)['frames']]
+            assert len(counts) == 6 and all(n in pixels for n in counts), counts
+            assert (none in out) == (camera == 'up.json'), (camera, more, out)
+
+
 def test_outstanding():
     """Faster than the server: dropped frames are counted, none is lost, the last one comes back."""
     with Daemon() as daemon, Bench(60) as bench:
@@ -392,7 +407,7 @@ def test_doctor():
         assert status == 1 and 'its first is demo' in out, out
 
 
-run_tests([test_frames, test_outstanding, test_probe_killed, test_daemon_killed,
+run_tests([test_frames, test_nothing_virtual_is_told, test_outstanding, test_probe_killed, test_daemon_killed,
            test_daemon_stopped, test_daemon_slow, test_jpeg, test_sync_light, test_several_views,
            test_no_light, test_late_start, test_interrupt, test_probe_files,
            test_probe_table_and_mask, test_view_files,

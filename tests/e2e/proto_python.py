@@ -275,8 +275,23 @@ def check_later_version():
     assert code == 0 and out == b'PING.t1_ns=5\n', (out, err)
 
 
+def check_presence():
+    """A count of 0 is another thing than none, which is what a server sends that does not know it."""
+    for value in (None, 0, 9120):
+        result = variants('Result')[0]
+        result.receipt.ClearField('virtual_pixels')
+        if value is not None:
+            result.receipt.virtual_pixels = value
+        data = frame_bytes(32, result)
+        dump = read_dump(run('dump', data)[1].decode())
+        assert dump.get('RESULT.receipt.virtual_pixels') == (None if value is None else [str(value)]), dump
+        (_, back, _), = parse(run('echo', data)[1])
+        assert back == result and back.receipt.HasField('virtual_pixels') == (value is not None), back
+
+
 CASES = [(name, lambda number=number, name=name: check(number, name)) for number, name in TYPES.items()]
-CASES += [('refusals', check_refusals), ('later version', check_later_version)]
+CASES += [('refusals', check_refusals), ('later version', check_later_version),
+          ('presence', check_presence)]
 print('1..%d' % len(CASES))
 failed = False
 for i, (title, case) in enumerate(CASES, 1):

@@ -108,17 +108,21 @@ def test_what_is_not_asked_for():
     grey = b'\x80\x80\x80'
     with Daemon() as daemon, probe(daemon) as light, Viewer(daemon, 64, 48) as viewer:
         light_up(light)
-        spared, beside, on, whole, _ = see(viewer, lighting_min_sequence=1, lighting_wait_ms=60000)
+        spared, beside, on, whole, whole_receipt = see(viewer, lighting_min_sequence=1, lighting_wait_ms=60000)
         assert not spared and max(beside) < 128 and on != grey, (spared, beside, on)
+        shown = whole_receipt.virtual_pixels
+        assert 100 < shown < 64 * 48 / 2, shown
         spared, _, on_alone, alone, receipt = see(viewer, no_shadow=True)
         assert 'shadow' in spared and 'shade' not in spared and on_alone != grey
         assert alone[:3 * 64] == grey * 64 and receipt.estimated_error <= 0, receipt
+        assert receipt.virtual_pixels == shown, (receipt.virtual_pixels, shown)
         left = [why_not_refined(receipt)]
         spared, beside, on, _, _ = see(viewer, no_virtual=True)
         assert 'shade' in spared and 'shadow' not in spared, spared
         assert max(beside) < 128 and max(on) < 80, 'no deep shadow under the hidden cube: %r' % on
         _, _, _, nothing, receipt = see(viewer, no_virtual=True, no_shadow=True)
         assert nothing == grey * (64 * 48) and receipt.rays_shadow == 0
+        assert receipt.HasField('virtual_pixels') and receipt.virtual_pixels == 0, receipt
         left.append(why_not_refined(receipt))
         assert left == 2 * [['other things are asked for than in the last frame']], left
         # A budget's figures are of frames that show the same.
@@ -141,6 +145,7 @@ def test_a_still_view_is_refined():
         light_up(light, 1)
         receipt, first = see(lighting_min_sequence=1, lighting_wait_ms=60000)
         assert receipt.refined_passes == 0 and receipt.refined_error < 0, receipt
+        shown = receipt.virtual_pixels
         assert why_not_refined(receipt) == ["the view's first frame"], receipt
         passes, errors = [], []
         while receipt.rays_primary > 0:
@@ -157,6 +162,7 @@ def test_a_still_view_is_refined():
         assert errors[0] < 0 and 0 <= known[-1] < 0.5 * known[0]
         assert known[-1] <= 1e-3 or passes[-1] == 1024
         assert receipt.rays_shadow == 0 and receipt.lighting_sequence == 1
+        assert receipt.virtual_pixels >= shown > 10, (receipt.virtual_pixels, shown)
         assert len(why_not_refined(receipt)) == 1
         status = json.loads(daemon.get('/api/v1/status')[1])
         assert status['rooms'][0]['last_receipt']['refined']['passes'] == passes[-1]

@@ -216,6 +216,31 @@ static void test_codes_of_curves(void **state)
     }
 }
 
+/* Pixels with any coverage are counted, of each picture anew; added light and shadow are none. */
+static void test_covered_pixels(void **state)
+{
+    struct fixture *f = *state;
+    const struct gn_response srgb = {.type = GN_RESPONSE_SRGB};
+    assert_int_equal(gn_compositor_get_n_covered(f->compositor), 0);
+    f->shadow.data[0] = 0.5f;
+    f->added.data[7] = 1;
+    assert_int_equal(put(f, &srgb), 0);
+    assert_int_equal(gn_compositor_get_n_covered(f->compositor), 0);
+    static const int places[] = {0, 1, WIDTH, WIDTH * HEIGHT / 2, WIDTH * HEIGHT - 1};
+    for (int i = 0; i < 5; i++)
+        f->rgba.data[4 * places[i] + 3] = 0.25f * (float)(i % 4 + 1);
+    for (int again = 0; again < 2; again++) {
+        assert_int_equal(put(f, &srgb), 0);
+        assert_int_equal(gn_compositor_get_n_covered(f->compositor), 5);
+    }
+    f->options.match.blur_px = 1; // an edge is wider then
+    assert_int_equal(put(f, &srgb), 0);
+    assert_true(gn_compositor_get_n_covered(f->compositor) > 5);
+    memset(f->rgba.data, 0, sizeof(float) * 4 * WIDTH * HEIGHT);
+    assert_int_equal(put(f, &srgb), 0);
+    assert_int_equal(gn_compositor_get_n_covered(f->compositor), 0);
+}
+
 static void test_refusals(void **state)
 {
     struct fixture *f = *state;
@@ -245,6 +270,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_half_covered, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_formula, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_codes_of_curves, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_covered_pixels, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_refusals, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

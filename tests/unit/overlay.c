@@ -93,6 +93,8 @@ static void fill_receipt(struct gn_msg_receipt *r)
     r->lighting_age_ms = -3.4e38f;
     r->lights_used = UINT_MAX;
     r->estimated_error = 3.4e38f;
+    r->has_virtual_pixels = true;
+    r->virtual_pixels = UINT_MAX;
     r->refined_passes = UINT_MAX;
     r->refined_error = 3.4e38f;
     r->has_budget = true;

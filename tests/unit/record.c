@@ -36,6 +36,7 @@ static struct gn_msg_result make_result(uint64_t id)
     result.receipt.lights_used = 64;
     result.receipt.rays_shadow = 1000;
     result.receipt.estimated_error = -1;
+    result.receipt.has_virtual_pixels = true;
     result.receipt.left_out_count = 1;
     strcpy(result.receipt.left_out[0].pass, "bounce");
     strcpy(result.receipt.left_out[0].why, "not \xff UTF-8");
@@ -82,6 +83,10 @@ static void test_run(void **state)
     struct gn_msg_dropped dropped = {.id = 2, .reason = GN_MSG_DROP_REASON_SUPERSEDED};
     strcpy(dropped.sentence, "a later frame came");
     assert_int_equal(gn_record_add_dropped(record, "b\xff", &dropped, NULL), 0);
+    // A server of before the count of virtual pixels.
+    struct gn_msg_result older = make_result(3);
+    older.receipt.has_virtual_pixels = false;
+    assert_int_equal(gn_record_add_result(record, "c", &older, pixels, 1, NULL), 0);
     assert_int_not_equal(access(report, F_OK), 0); // whole or absent
     const struct gn_source_counts counts = {.n_complete = 1,
                                             .n_incomplete = 2,
@@ -107,15 +112,18 @@ static void test_run(void **state)
     gn_image_file_finish(&file);
 
     json_t *root = load();
-    assert_true(get_int(root, "sent") == 3 && get_int(root, "results") == 1 &&
+    assert_true(get_int(root, "sent") == 3 && get_int(root, "results") == 2 &&
                 get_int(root, "dropped") == 1);
     assert_true(json_is_false(json_object_get(root, "complete")));
     const json_t *frames = json_object_get(root, "frames");
-    assert_int_equal(json_array_size(frames), 2);
+    assert_int_equal(json_array_size(frames), 3);
     const json_t *a = json_array_get(frames, 0), *b = json_array_get(frames, 1);
+    const json_t *c = json_object_get(json_array_get(frames, 2), "receipt");
+    assert_true(json_is_null(json_object_get(c, "virtual_pixels")));
     assert_true(json_real_value(json_object_get(a, "latency_ms")) == 12.5);
     const json_t *receipt = json_object_get(a, "receipt");
     assert_true(get_int(receipt, "lighting_sequence") == 42 && get_int(receipt, "lights") == 64);
+    assert_int_equal(get_int(receipt, "virtual_pixels"), 0);
     assert_true(json_is_null(json_object_get(receipt, "estimated_error")));
     assert_int_equal(get_int(json_object_get(receipt, "rays"), "shadow"), 1000);
     const json_t *left_out = json_array_get(json_object_get(receipt, "left_out"), 0);
