@@ -17,7 +17,7 @@ from chart import CHART
 from folder import Folder
 from pictures import png_bytes, read_png
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[1]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[1]
 DATA = os.environ.get('GNOMON_DATA')
 PATCH, GAP, BORDER = 90, 9, 60
 A, B, C = 0.6, 0.07, 2e-4

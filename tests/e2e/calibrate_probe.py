@@ -17,7 +17,7 @@ from gnomond import *  # noqa: E402,F403
 from folder import Folder  # noqa: E402
 from pictures import png_bytes, read_png  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[3]
 LAMP = (-0.291386, 0.388514, 0.874157)
 MARKERS = {'dictionary': '4x4_50', 'bodies': [
     {'name': 'world', 'markers': [{'id': 7, 'size': 0.1}, {'id': 8, 'size': 0.06, 'position': [0.14, 0, 0]}]},

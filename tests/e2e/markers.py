@@ -19,7 +19,7 @@ sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes, read_png, y4m_bytes  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[3]
 SHOTS = 6  # picture 3 has no marker in it
 SCENE = '{"objects": [{"mesh": "floor.obj", "role": "real"},' \
     ' {"mesh": "cube.obj", "role": "virtual", "name": "cube", "movable": true}]}'

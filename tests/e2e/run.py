@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: ISC
 """A run of gnomon as a separate process, read while it runs.
 
-The third argument of the script is the program; the environment's GNOMON_CLIENT names another, as
+The third argument of the script is the program; the environment's CLIENT_UNDER_TEST names another, as
 one made with sanitizers.
 """
 import os
@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[3]
 SANITIZERS = ('AddressSanitizer', 'LeakSanitizer', 'ThreadSanitizer', 'runtime error')
 
 

@@ -16,7 +16,7 @@ import time
 sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[3]
 SCENE = '{"objects": [{"mesh": "floor.obj", "role": "real"},' \
     ' {"mesh": "cube.obj", "role": "virtual", "name": "cube", "movable": true}]}'
 

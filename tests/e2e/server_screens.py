@@ -16,7 +16,7 @@ sys.path.insert(0, sys.argv[2])
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes  # noqa: E402
 
-GNOMON = os.environ.get('GNOMON_CLIENT') or sys.argv[3]
+GNOMON = os.environ.get('CLIENT_UNDER_TEST') or sys.argv[3]
 EMITTER_FRAME = 20
 # A quad at x = -0.4, 0.8 m wide, that faces +x; the cube stands at the origin.
 TV = 'v -0.4 -0.4 0.3\nv -0.4 0.4 0.3\nv -0.4 0.4 0.9\nv -0.4 -0.4 0.9\n' \
