@@ -86,11 +86,17 @@ int gn_listen_loopback(const char *what, const struct gn_address *address, int b
                             "listens on 127.0.0.1 or [::1] only",
                             what, address->host);
     }
+    char wanted[GN_LISTEN_TEXT_BYTES];
+    gn_listen_format(at->ai_addr, at->ai_addrlen, wanted);
     int fd = open_listener(at->ai_addr, at->ai_addrlen, backlog);
     freeaddrinfo(list);
+    if (fd == -EADDRINUSE)
+        return gn_error_set(out_error, fd,
+                            "%s %s: in use: another program listens there, perhaps an older one of "
+                            "these: end it, or give another %s ADDRESS:PORT (port 0 picks one)",
+                            what, wanted, what);
     if (fd < 0)
-        return gn_error_set(out_error, fd, "%s %s:%u: %s", what, address->host, address->port,
-                            strerror(-fd));
+        return gn_error_set(out_error, fd, "%s %s: %s", what, wanted, strerror(-fd));
     struct sockaddr_storage bound;
     socklen_t len = sizeof(bound);
     if (getsockname(fd, (struct sockaddr *)&bound, &len) < 0) {

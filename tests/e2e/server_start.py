@@ -62,9 +62,10 @@ def test_addresses():
     refuse(Room(), 'loopback', arguments=['--listen', '[::]:0'])
     with Daemon() as daemon:
         taken = '127.0.0.1:%d' % daemon.address[1]
-        refuse(Room(), '--listen', 'in use', arguments=['--listen', taken])
+        refuse(Room(), '--listen %s: in use: another program listens there' % taken,
+               'another --listen', arguments=['--listen', taken])
         taken = '127.0.0.1:%d' % daemon.http_address[1]
-        refuse(Room(), '--http', 'in use', arguments=['--http', taken])
+        refuse(Room(), '--http %s: in use' % taken, 'another --http', arguments=['--http', taken])
 
 
 def test_ready_file():

@@ -46,7 +46,10 @@ static void test_picked_port(void **unused)
     struct gn_error error = {0};
     assert_int_equal(try_listen(text, again, &error), -EADDRINUSE);
     assert_string_equal(again, "untouched");
-    assert_non_null(strstr(error.text, "--listen "));
+    char words[64 + GN_LISTEN_TEXT_BYTES];
+    snprintf(words, sizeof(words), "--listen %s: in use: another program listens there", text);
+    assert_int_equal(strncmp(error.text, words, strlen(words)), 0);
+    assert_non_null(strstr(error.text, "end it, or give another --listen ADDRESS:PORT"));
     close(fd);
 }
 
