@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "client/calibrate/views.h"
 #include "client/cmd.h"
@@ -42,9 +43,9 @@ static const struct gn_option option_table[] = {
      .default_value = GN_BODY_WORLD,
      .value_name = "NAME",
      .help = "With --markers: which body."},
-    GN_CALIBRATE_OUT_OPTION(
-        "The SVG file. Its sizes are millimetres: print it at 100 %, not fitted "
-        "to the page, and measure the line at its foot."),
+    GN_CALIBRATE_OUT_OPTION("The SVG file; -: standard output. Its sizes are millimetres: print it "
+                            "at 100 %, not fitted to the page, as browsers can, and measure the "
+                            "line at its foot."),
 };
 
 static const struct gn_program program = {
@@ -66,6 +67,13 @@ static bool is_set(const struct gn_options *options, const char *key)
     return gn_options_is_set(options, NULL, NULL, key);
 }
 
+/** Whether the name says what is written there. */
+static bool is_svg(const char *path)
+{
+    size_t n = strlen(path);
+    return strcmp(path, "-") == 0 || (n >= 4 && strcasecmp(path + n - 4, ".svg") == 0);
+}
+
 /** What is wrong with the options together; NULL: nothing. */
 static const char *find_misuse(const struct gn_options *options)
 {
@@ -81,6 +89,9 @@ static const char *find_misuse(const struct gn_options *options)
                "sheet of its own";
     if (!is_set(options, "markers") && !gn_options_is_default(options, NULL, NULL, "body"))
         return "--body is for --markers FILE";
+    if (!is_svg(gn_options_get_string(options, NULL, NULL, "out")))
+        return "--out: what is written is SVG, so give a name that ends in .svg, or - for standard "
+               "output; a browser opens it, and prints it at 100 % or to a PDF";
     return NULL;
 }
 
@@ -151,8 +162,11 @@ int gn_cmd_calibrate_print(int argc, char *const argv[])
     } else {
         bool is_a4 = fmin(size.width_mm, size.height_mm) <= 210 &&
                      fmax(size.width_mm, size.height_mm) <= 297;
-        printf("%s: %.0f x %.0f mm%s; print it at 100 %%, then measure its line of %d mm\n", path,
-               size.width_mm, size.height_mm, is_a4 ? "" : ", larger than A4", size.ruler_mm);
+        bool is_piped = strcmp(path, "-") == 0;
+        fprintf(is_piped ? stderr : stdout,
+                "%s: %.0f x %.0f mm%s; print it at 100 %%, then measure its line of %d mm\n",
+                is_piped ? "standard output" : path, size.width_mm, size.height_mm,
+                is_a4 ? "" : ", larger than A4", size.ruler_mm);
     }
     gn_options_destroy(&options);
     return ret ? 1 : 0;

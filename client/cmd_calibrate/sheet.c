@@ -125,8 +125,12 @@ static int finish(struct sheet *s, const char *path, int err, struct gn_sheet_si
             MARGIN_MM, y, s->is.ruler_mm, MARGIN_MM + 2, y + 5, s->is.ruler_mm);
     if (fclose(s->out) != 0 && !err)
         err = gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
-    if (!err)
+    if (!err && strcmp(path, "-") == 0) {
+        if (fwrite(s->text, 1, s->size, stdout) != s->size || fflush(stdout) != 0)
+            err = gn_error_set(out_error, -EIO, "standard output: %s", strerror(errno));
+    } else if (!err) {
         err = gn_file_write(path, s->text, s->size, out_error);
+    }
     if (!err)
         *out_size = s->is;
     free(s->text);

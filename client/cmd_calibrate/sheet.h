@@ -3,7 +3,7 @@
 /*
  * Boards and markers to print: SVG files in millimetres, black on white, with the white margin that
  * they need, a line of text that says what it is, and a ruler that tells whether the printer has
- * scaled it. Thread-safety: safe.
+ * scaled it. The path "-" is standard output. Thread-safety: safe.
  */
 #ifndef GN_CLIENT_CMD_CALIBRATE_SHEET_H
 #define GN_CLIENT_CMD_CALIBRATE_SHEET_H

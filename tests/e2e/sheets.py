@@ -84,6 +84,7 @@ def test_boards():
                                        *words, '--out', f.at('camera.json')], capture_output=True, text=True)
                 assert done.stdout.startswith('%s: %d corners\n' % (f.at('sheet.png'), n_corners)), done
                 assert 'at least 5' in done.stderr and done.returncode == 1, done  # one is too few
+                assert not os.path.exists(f.at('camera.json'))
 
 
 def find_world(f, size, quads, *words):
@@ -157,6 +158,7 @@ def test_refused():
             (('--board', '10x10'), 1, 'upside down'),
             (('--board', '40x7'), 1, '3 to 33 squares'),
             (('--board', '10x7', '--charuco', '4x4_50', '--marker', '4x4_50:7:0.05'), 1, 'in metres'),
+            (('--marker', '4x4_50:77:80'), 1, '--marker 4x4_50:77:80: '),
             (('--board', '10x7', '--charuco', '4x4_50', '--marker', '0.5'), 1, 'do not lie in squares'),
             (('--markers', 'none.json'), 1, 'none.json')):
         with Paper() as f:
@@ -166,6 +168,16 @@ def test_refused():
     with Paper() as f:
         err = f.run('calibrate', 'print', '--board', '10x7', '--out', 'no/x.svg', status=1)
         assert 'no/x.svg' in err, err
+        for name in ('x.pdf', 'x', 'svg', 'x.svg.png', '.'):
+            err = f.run('calibrate', 'print', '--board', '10x7', '--out', name, status=2)
+            assert 'ends in .svg, or - for standard output' in err and err.count('\n') == 1, err
+        assert os.listdir(f.path) == []
+        f.run('calibrate', 'print', '--board', '10x7', '--out', 'X.SVG')
+        done = subprocess.run([GNOMON, 'calibrate', 'print', '--board', '10x7', '--out', '-'], cwd=f.path,
+                              capture_output=True, text=True, timeout=100, check=True)
+        with open(f.at('X.SVG')) as sheet:
+            assert done.stdout == sheet.read() and os.listdir(f.path) == ['X.SVG'], done.stdout
+        assert done.stderr.startswith('standard output: ') and 'print it at 100 %' in done.stderr, done.stderr
         if HAS_OPENCV:
             err = f.run('calibrate', 'print', '--board', '33x33', '--charuco', '4x4_50', '--out', 'x.svg',
                         status=1)
