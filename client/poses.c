@@ -82,17 +82,16 @@ int64_t gn_poses_get_time_ns(const struct gn_capture *capture)
     return capture->time_ns ? capture->time_ns : (int64_t)llround(capture->time_s * 1e9);
 }
 
-/** Says where a marker is so large that its size is hardly meant in metres. */
-static void check_sizes(const struct gn_poses *p)
+void gn_poses_doubt_sizes(const struct gn_bodies *bodies, const char *source)
 {
-    for (int i = 0; i < p->bodies.n_bodies; i++) {
-        for (int k = 0; k < p->bodies.bodies[i].n_markers; k++) {
-            struct gn_body_marker *m = &p->bodies.bodies[i].markers[k];
-            double(*c)[3] = m->corners_body;
+    for (int i = 0; i < bodies->n_bodies; i++) {
+        for (int k = 0; k < bodies->bodies[i].n_markers; k++) {
+            const struct gn_body_marker *m = &bodies->bodies[i].markers[k];
+            const double(*c)[3] = m->corners_body;
             double side = sqrt(pow(c[1][0] - c[0][0], 2) + pow(c[1][1] - c[0][1], 2) +
                                pow(c[1][2] - c[0][2], 2));
             if (side > LARGE_SIDE * (1 + 1e-9)) {
-                fprintf(stderr, "gnomon: %s: marker %d: sizes are in metres: %g m?\n", p->source,
+                fprintf(stderr, "gnomon: %s: marker %d: sizes are in metres: %g m?\n", source,
                         m->id, side);
                 return;
             }
@@ -120,7 +119,7 @@ int gn_poses_open(const struct gn_options *options, const struct gn_camera *came
         snprintf(b->name, sizeof(b->name), "%s", object);
     }
     if (!err)
-        check_sizes(p);
+        gn_poses_doubt_sizes(&p->bodies, p->source);
     p->world = gn_bodies_find(&p->bodies, GN_BODY_WORLD);
     const struct gn_tracker_options wanted = {
         .camera = camera,

@@ -52,6 +52,10 @@ bool gn_poses_is_asked(const struct gn_options *options);
 /** What is wrong with the options of GN_POSES_OPTIONS together; NULL: nothing. */
 const char *gn_poses_find_misuse(const struct gn_options *options);
 
+/** Says on stderr where a marker is so large that its side is rather meant in millimetres. source:
+ * what lists the bodies. */
+void gn_poses_doubt_sizes(const struct gn_bodies *bodies, const char *source);
+
 /** Reads camera.json, which need not say where the camera is (out_has_place): markers do. Returns
  * 0, or a negative errno and a sentence. */
 GN_MUST_USE int gn_poses_read_camera(const char *path, struct gn_camera *out_camera,

@@ -9,6 +9,7 @@
 #include "client/cmd_calibrate/calibrate_places.h"
 #include "client/cmd_calibrate/calibrate_probe.h"
 #include "client/feature.h"
+#include "client/poses.h"
 #include "client/vision/markers.h"
 
 #define DEGREE 57.29577951308232
@@ -46,6 +47,8 @@ int gn_probe_run_read_markers(struct gn_probe_run *run, struct gn_error *out_err
                             "radii");
     int err = path ? gn_bodies_read_file(path, &run->bodies, out_error)
                    : gn_bodies_read_text(gn_probe_run_get(run, "marker"), &run->bodies, out_error);
+    if (!err)
+        gn_poses_doubt_sizes(&run->bodies, path ? path : "--marker");
     if (!err && gn_bodies_find(&run->bodies, GN_BODY_WORLD) < 0)
         err = gn_error_set(out_error, -EINVAL,
                            "%s: there is no body \"" GN_BODY_WORLD

@@ -14,6 +14,7 @@
 #include "client/cmd.h"
 #include "client/cmd_calibrate/calibrate_input.h"
 #include "client/cmd_calibrate/sheet.h"
+#include "client/poses.h"
 #include "client/vision/markers.h"
 #include "proto/attr.h"
 
@@ -131,6 +132,8 @@ static int print_body(const struct gn_options *options, const char *path,
                                          &bodies, &why);
     if (!file && err)
         return gn_error_set(out_error, err, "--marker %s", why.text);
+    if (!err)
+        gn_poses_doubt_sizes(&bodies, file ? file : "--marker");
     int body = err ? -1 : gn_bodies_find(&bodies, name);
     if (!err && body < 0)
         err = gn_error_set(out_error, -EINVAL, "%s: there is no body called \"%s\"", file, name);

@@ -130,6 +130,8 @@ def test_one_marker():
     said = succeed('near-0', out, '--marker', '4x4_50:7:0.1')
     assert 'marker 8: ' in said and 'not listed, left out' in said, said
     check(out, DESK.truth['near'])
+    status, said, err = calibrate('near-0', out, '--marker', '4x4_50:7:100')  # millimetres
+    assert status == 0 and err == 'gnomon: --marker: marker 7: sizes are in metres: 100 m?\n', (status, err)
 
 
 def test_another_body_seen():
