@@ -29,20 +29,27 @@ int gn_live_count_asked(const struct gn_options *options)
     return n;
 }
 
+static bool has_exposure(const struct gn_options *options)
+{
+    return gn_options_is_known(options, NULL, "exposure-us") &&
+           gn_options_is_set(options, NULL, NULL, "exposure-us");
+}
+
 const char *gn_live_find_misuse(const struct gn_options *options)
 {
-    static const char *const settings[] = {"frame-size", "frame-rate",   "exposure-us",
-                                           "gain",       "pixel-format", "lock-white-balance",
-                                           "controls"};
+    static const char *const settings[] = {"frame-size",   "frame-rate",         "gain",
+                                           "pixel-format", "lock-white-balance", "controls"};
+    static const char of_cameras[] =
+        "--frame-size, --frame-rate, --gain and what else sets a camera are for cameras, and none "
+        "is named";
     int n_cameras = gn_live_count_asked(options);
     if (n_cameras > 1)
         return "one camera can be read, not several";
     for (size_t i = 0; n_cameras == 0 && i < GN_ARRAY_LEN(settings); i++) {
         if (gn_options_is_set(options, NULL, NULL, settings[i]))
-            return "--frame-size, --frame-rate, --exposure-us, --gain, --pixel-format, "
-                   "--lock-white-balance and --controls are for cameras, and none is named";
+            return of_cameras;
     }
-    return NULL;
+    return n_cameras == 0 && has_exposure(options) ? of_cameras : NULL;
 }
 
 static int read_size(const char *text, struct gn_live_options *live, struct gn_error *out_error)
@@ -72,7 +79,7 @@ int gn_live_open(const struct gn_options *options, const struct gn_live_options 
         return err;
     if (gn_options_is_set(options, NULL, NULL, "frame-rate"))
         live.frame_rate_hz = gn_options_get_double(options, NULL, NULL, "frame-rate");
-    if (gn_options_is_set(options, NULL, NULL, "exposure-us"))
+    if (has_exposure(options))
         live.exposure_us = gn_options_get_double(options, NULL, NULL, "exposure-us");
     live.has_gain = gn_options_is_set(options, NULL, NULL, "gain");
     if (live.has_gain)

@@ -13,7 +13,8 @@
 #include "client/capture/source.h"
 #include "common/options.h"
 
-/** Rows of the option table that every command which can read a camera has. */
+/** Rows of the option table that every command which can read a camera has; with
+ * GN_LIVE_EXPOSURE_OPTION, where the command does not set the exposure itself. */
 #define GN_LIVE_OPTIONS                                                                            \
     {.key = "gige",                                                                                \
      .flag = "gige",                                                                               \
@@ -40,13 +41,6 @@
          .max = 10000,                                                                             \
          .value_name = "HZ",                                                                       \
          .help = "Pictures per second that the camera takes."},                                    \
-        {.key = "exposure-us",                                                                     \
-         .flag = "exposure-us",                                                                    \
-         .type = GN_OPTION_DOUBLE,                                                                 \
-         .min = 1,                                                                                 \
-         .max = 1e8,                                                                               \
-         .value_name = "US",                                                                       \
-         .help = "The camera's exposure time in microseconds; its automatic is then off."},        \
         {.key = "gain",                                                                            \
          .flag = "gain",                                                                           \
          .type = GN_OPTION_DOUBLE,                                                                 \
@@ -70,6 +64,13 @@
         .help = "The camera's own name of a pixel format, such as Mono12p or YUYV; without it "    \
                 "the one "                                                                         \
                 "that tells most."                                                                 \
+    }
+
+#define GN_LIVE_EXPOSURE_OPTION                                                                    \
+    {                                                                                              \
+        .key = "exposure-us", .flag = "exposure-us", .type = GN_OPTION_DOUBLE, .min = 1,           \
+        .max = 1e8, .value_name = "US",                                                            \
+        .help = "The camera's exposure time in microseconds; its automatic is then off."           \
     }
 
 /** How many cameras are named on the command line: 0 or 1 in a sound one. */

@@ -222,6 +222,15 @@ static const struct gn_option_value *get_typed(const struct gn_options *options,
     return value;
 }
 
+bool gn_options_is_known(const struct gn_options *options, const char *section, const char *key)
+{
+    for (int i = 0; i < options->program->n_options; i++)
+        if (gn_section_is_same(options->program->options[i].section, section) &&
+            strcmp(options->program->options[i].key, key) == 0)
+            return true;
+    return false;
+}
+
 bool gn_options_is_set(const struct gn_options *options, const char *section, const char *name,
                        const char *key)
 {

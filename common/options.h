@@ -101,6 +101,10 @@ GN_MUST_USE int gn_options_read_text(struct gn_options *options, const char *tex
 /** Refuses the absence of what is required. */
 GN_MUST_USE int gn_options_check(const struct gn_options *options, struct gn_error *out_error);
 
+/** Whether the table holds a key of the plain section: of rows that programs share some leave one
+ * out. */
+bool gn_options_is_known(const struct gn_options *options, const char *section, const char *key);
+
 /*
  * Values. section and key as in the table, but "room" with name "demo" for [room demo]; name NULL
  * for plain sections. Asking for what the table does not hold, or with another type, is a bug.

@@ -15,7 +15,7 @@
 #include "proto/attr.h"
 
 /** Rows of the option table that every command has which takes such pictures. */
-#define GN_CALIBRATE_LIVE_OPTIONS GN_FEED_VIDEO_OPTION, GN_LIVE_OPTIONS
+#define GN_CALIBRATE_LIVE_OPTIONS GN_FEED_VIDEO_OPTION, GN_LIVE_OPTIONS, GN_LIVE_EXPOSURE_OPTION
 
 /** Whether a video or a camera is named. */
 bool gn_calibrate_is_live(const struct gn_options *options);

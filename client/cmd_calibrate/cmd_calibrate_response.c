@@ -158,8 +158,8 @@ static const char *find_misuse(const struct gn_options *options)
                "of them";
     if (n_cameras && !has(options, "exposures"))
         return "a camera needs --exposures, such as 4,1,2,8,16ms or auto";
-    if (n_cameras && (has(options, "times") || has(options, "exposure-us")))
-        return "a camera's exposures are those of --exposures: no --times, no --exposure-us";
+    if (n_cameras && has(options, "times"))
+        return "a camera's exposures are those of --exposures: no --times";
     if (n_cameras && has(options, "bayer"))
         return "--bayer is for files; a camera's own mosaic is interpolated";
     if (!n_cameras && (has(options, "live") || has(options, "exposures") ||

@@ -51,6 +51,7 @@ static const struct gn_option option_table[] = {
      .help = "With markers: a folder's pictures, or a pattern in quotes such as 'frames/*.png'."},
     GN_FEED_VIDEO_OPTION,
     GN_LIVE_OPTIONS,
+    GN_LIVE_EXPOSURE_OPTION,
     {.key = "camera",
      .flag = "camera",
      .type = GN_OPTION_STRING,

@@ -13,6 +13,7 @@ static const struct gn_option option_table[] = {
     GN_CMD_CONNECT_OPTIONS,
     GN_FEED_OPTIONS,
     GN_LIVE_OPTIONS,
+    GN_LIVE_EXPOSURE_OPTION,
     GN_POSES_OPTIONS,
     {.key = "camera",
      .flag = "camera",

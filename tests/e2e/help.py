@@ -4,9 +4,11 @@
 
 usage: help.py GNOMOND GNOMON GNOMON_RENDER
 """
+import os
 import re
 import subprocess
 import sys
+import tempfile
 
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 SERVER = {'server', 'room', 'token'}
@@ -31,7 +33,7 @@ OPTIONS = [
     ([GNOMON, 'calibrate', 'intrinsics'], LIVE | {'files', 'video', 'board', 'square', 'charuco', 'marker',
                                                   'square-pixels', 'max-error', 'out', 'picture',
                                                   'views', 'keep'}),
-    ([GNOMON, 'calibrate', 'response'], LIVE | {'chart', 'stack', 'live', 'exposures', 'frames', 'keep', 'times',
+    ([GNOMON, 'calibrate', 'response'], (LIVE - {'exposure-us'}) | {'chart', 'stack', 'live', 'exposures', 'frames', 'keep', 'times',
                                                 'model', 'method', 'as', 'corners', 'out', 'full-scale',
                                                 'bits', 'bayer', 'matrix', 'plot', 'picture', 'radiance'}),
     ([GNOMON, 'calibrate', 'probe'], LIVE | {'files', 'video', 'frames', 'out', 'projection', 'theta-max', 'find-circle', 'ball',
@@ -79,6 +81,58 @@ def check_options(command, wanted):
     assert re.fullmatch(re.escape(name) + r' \d+\.\d+\.\d+\n', version), version
 
 
+# Command lines that each command takes, as far as they go: nothing is there that they name. Together
+# they have every option that it lists, but for --gige, which looks for cameras for seconds.
+FED = '--server 127.0.0.1:1 --room a --token s --record none/a --record-max 1MiB --rate 5 --start-at 1 --loop --count 9'
+SET = '--v4l2 /dev/null --frame-size 4x4 --frame-rate 5 --gain 1 --lock-white-balance --controls a=1 --pixel-format a'
+ONE = '--camera none --marker 4x4_50:7:0.05'
+WAYS = {
+    'probe': ['--files none --setup none ' + FED, '--video none --projection angular', '--sequence none',
+              '--exposure-us 9 --first-sequence 9 ' + SET],
+    'track': ['--object a --poses none', '--object a --orbit 1',
+              '--object a --files none --camera none --markers none --predict-ms 5 ' + FED,
+              '--object a --video none --no-steady --debug-markers none ' + ONE,
+              '--object a --exposure-us 9 %s %s' % (ONE, SET)],
+    'screen': ['--stream a --files none --scale 5 ' + FED, '--stream a --video none'],
+    'view': ['--files none --camera none --markers none --out none/a --match blur --sync-light 9 ' + FED,
+             '--sequence none --out none/a --result jpeg --jpeg-quality 9 --quality reference --outstanding 9',
+             '--video none --no-steady --debug-markers none --window --show shadow --budget-ms 9 ' + ONE,
+             '--out none/a --exposure-us 9 %s %s' % (ONE, SET)],
+    'replay': ['none --streams probe --rate-factor 2 --open-loop --pin-light --loop --out none/a --record none/b'
+               ' --record-max 1MiB --server 127.0.0.1:1 --room a --token s',
+               'none --as-fast-as-possible --expect-equal', 'none --info'],
+    'calibrate print': ['--board 10x7 --square 0.03 --charuco 4x4_50 --marker 1 --out none/a.svg',
+                        '--markers none --body cup --out none/a.svg'],
+    'calibrate intrinsics': ['--files none --board 10x7 --square 0.03 --charuco 4x4_50 --marker 0.02'
+                             ' --square-pixels --max-error 2 --out none/a --picture none/b',
+                             '--video none --board 10x7 --out none/a',
+                             '--views 9 --keep none/c --exposure-us 9 --board 10x7 --out none/a ' + SET],
+    'calibrate response': ['--chart none --times 1,2 --model linear --corners 1,2 --full-scale 4095 --bits 12'
+                           ' --bayer rggb --no-matrix --plot none/b --picture none/c --out none/a',
+                           '--stack none --times 1,2 --method robertson --as gamma --radiance none/b --out none/a',
+                           '--live stack --exposures auto --frames 9 --keep none/c --out none/a ' + SET],
+    'calibrate probe': ['--files none --projection angular --theta-max 90 --lamps none --fit radius --share 0.5'
+                        ' --tolerance 5 --full-scale 4095 --picture none/b --out none/a',
+                        '--video none --ball 9,9,9 --camera-share 0.5 --out none/a',
+                        '--files none --markers none --camera none --camera-files none --out none/a',
+                        '--find-circle --marker 4x4_50:7:0.05 --frames 9 --exposure-us 9 --out none/a ' + SET],
+}
+
+
+def check_accepted(name):
+    """What --help lists is taken: no command refuses an option of its own always."""
+    command = [os.path.abspath(GNOMON)] + name.split()
+    taken = {'help', 'version', 'gige'}
+    for way in WAYS[name]:
+        with tempfile.TemporaryDirectory() as nowhere:
+            done = subprocess.run(command + way.split(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                  timeout=60, stdin=subprocess.DEVNULL, text=True, cwd=nowhere)
+        assert done.returncode == 1 and done.stderr.count('\n') == 1, (way, done)
+        taken |= {word[5:] if word.startswith('--no-') else word[2:] for word in way.split() if word[:2] == '--'}
+    listed = set(re.findall(r'^  --([a-z0-9-]+)', ask(*command, '--help'), re.M))
+    assert listed <= taken, '%s lists what no command line here has: %s' % (name, sorted(listed - taken))
+
+
 def check_program():
     """gnomon itself and gnomon calibrate: each command once, with a summary."""
     text = ask(GNOMON, '--help')
@@ -94,10 +148,11 @@ def check_program():
 
 
 def main():
-    print('1..%d' % (len(OPTIONS) + 1))
     failed = 0
     tests = [('gnomon', check_program, ())]
     tests += [(' '.join([c[0].rsplit('/', 1)[1]] + c[1:]), check_options, (c, w)) for c, w in OPTIONS]
+    tests += [('gnomon %s takes what it lists' % name, check_accepted, (name,)) for name in WAYS]
+    print('1..%d' % len(tests))
     for n, (name, check, arguments) in enumerate(tests, 1):
         try:
             check(*arguments)
