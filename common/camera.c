@@ -167,7 +167,15 @@ int gn_camera_read_file(const char *path, struct gn_camera *out_camera, struct g
     int ret = gn_json_load_file(path, &root, out_error);
     if (ret < 0)
         return ret;
-    ret = gn_camera_read_json(&root, true, out_camera, out_error);
+    bool has_pose = gn_json_has(&root, "world_from_camera");
+    struct gn_camera camera;
+    ret = gn_camera_read_json(&root, has_pose, &camera, out_error);
+    if (ret == 0 && !has_pose)
+        ret = gn_json_refuse(&root, "world_from_camera", out_error,
+                             "missing: where the camera is, 16 numbers row-major "
+                             "(docs/frames.md), which its calibration does not know");
+    if (ret == 0)
+        *out_camera = camera;
     gn_json_finish(&root);
     return ret;
 }

@@ -48,9 +48,9 @@ bool gn_camera_project(const struct gn_camera *camera, const double point_camera
 
 /**
  * Reads camera.json (docs/frames.md): width, height, fx, fy, cx, cy, distortion[5],
- * world_from_camera[16 row-major], optional response, to_rec709, scale, noise,
- * blur. On failure returns a
- * negative errno and one sentence in *out_error (may be NULL).
+ * world_from_camera[16 row-major], optional response, to_rec709, scale, noise, blur. On failure,
+ * also where the pose is missing, returns a negative errno and one sentence in *out_error (may be
+ * NULL).
  */
 GN_MUST_USE int gn_camera_read_file(const char *path, struct gn_camera *out_camera,
                                     struct gn_error *out_error);

@@ -8,13 +8,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "client/calibrate/device_file.h"
 #include "client/cmd.h"
 #include "client/cmd_calibrate/calibrate_collect.h"
 #include "client/cmd_calibrate/calibrate_input.h"
 #include "client/feature.h"
+#include "client/poses.h"
 #include "client/vision/boards.h"
 #include "client/vision/markers.h"
 #include "common/png.h"
@@ -214,15 +214,16 @@ static int write_results(const struct run *run, const struct gn_options *options
                               gn_device_file_make_numbers(in->distortion, 5));
     json_decref(numbers);
     const char *path = gn_options_get_string(options, NULL, NULL, "out");
-    if (found && access(path, F_OK) != 0) {
-        // Where the camera is markers or a tracker say; until then it looks down at the marker.
-        static const double above[16] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0.5, 0, 0, 0, 1};
-        json_object_set_new(found, "world_from_camera", gn_device_file_make_numbers(above, 16));
-        printf("%s: new; its world_from_camera, half a metre above the marker, is a stand-in for "
-               "what markers or a tracker say\n",
+    struct gn_camera camera;
+    bool has_place = false;
+    int err = gn_device_file_update(path, found, out_error);
+    if (!err)
+        err = gn_poses_read_camera(path, &camera, &has_place, out_error);
+    if (!err && !has_place)
+        printf("%s: where the camera is it does not say: gnomon view finds that by --marker or "
+               "--markers; of a camera at rest add its world_from_camera\n",
                path);
-    }
-    return gn_device_file_update(path, found, out_error);
+    return err;
 }
 
 static int calibrate(struct run *run, const struct gn_options *options, struct gn_error *out_error)

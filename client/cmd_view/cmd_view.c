@@ -20,8 +20,8 @@ static const struct gn_option option_table[] = {
      .type = GN_OPTION_STRING,
      .value_name = "FILE",
      .help =
-         "With --files or a camera: camera.json with intrinsics and the pose of a camera at rest "
-         "(docs/frames.md). A sequence brings its own."},
+         "With --files or a camera: camera.json with intrinsics (docs/frames.md), and, where no "
+         "markers are looked for, the pose of a camera at rest. A sequence brings its own."},
     {.key = "out",
      .flag = "out",
      .type = GN_OPTION_STRING,

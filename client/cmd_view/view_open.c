@@ -78,9 +78,12 @@ int gn_viewer_open(struct gn_feed *r, const struct gn_options *options, struct g
         list = sequence.pictures;
         memset(&sequence.pictures, 0, sizeof(sequence.pictures));
     } else {
-        err = gn_poses_is_asked(options)
-                  ? gn_poses_read_camera(camera_path, &v->camera, &has_place, out_error)
-                  : gn_camera_read_file(camera_path, &v->camera, out_error);
+        err = gn_poses_read_camera(camera_path, &v->camera, &has_place, out_error);
+        if (!err && !has_place && !gn_poses_is_asked(options))
+            err = gn_error_set(out_error, -EINVAL,
+                               "nothing says where the camera is: give --marker DICT:ID:SIZE or "
+                               "--markers FILE, or world_from_camera in %s",
+                               camera_path);
         if (!err && v->camera.response.type == GN_RESPONSE_TABLE)
             err = gn_error_set(out_error, -EINVAL,
                                "%s: camera frames travel with no table as response; right would "

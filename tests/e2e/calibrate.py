@@ -397,6 +397,7 @@ def check_published_intrinsics():
                 key, found[key], value, ours, theirs))
             assert abs(found[key] - value) < 2 * math.hypot(ours, theirs), (key, found[key], value)
         assert float(re.search(r'^error ([\d.]+) px RMS over', out, re.M).group(1)) < .3
+        assert 'world_from_camera' not in found and 'where the camera is it does not say' in out, out
         refuse('pictures show the board', 'intrinsics', '--files', pictures, '--board', '8x5', '--out',
                f.at('x.json'))
         refuse('a board of 10x7 squares is seen, and --board counts squares', 'intrinsics', '--files', pictures,

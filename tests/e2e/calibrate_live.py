@@ -132,6 +132,7 @@ def test_intrinsics():
         found = read_camera(f.at('camera.json'))
         for key, value in (('fx', FOCAL), ('fy', FOCAL), ('cx', CENTRE[0]), ('cy', CENTRE[1])):
             assert abs(found[key] / value - 1) < .015, (key, found[key], value)
+        assert 'world_from_camera' not in found and 'where the camera is it does not say' in out, out
         assert len(os.listdir(f.at('kept'))) == len(VIEWS)
         run('intrinsics', '--files', f.at('kept'), *BOARD, '--out', f.at('again.json'))
         assert read_camera(f.at('again.json')) == found

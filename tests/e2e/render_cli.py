@@ -421,6 +421,8 @@ def list_bad():
     yield 'width', [], camera_with(width=1000000)
     yield 'fx', [], camera_with(fx=-1)
     yield 'world_from_camera', [], camera_with(world_from_camera=[0] * 16)
+    yield 'world_from_camera: missing: where the camera is', [], file_of('camera', 'calibrated.json', json.dumps(
+        {k: v for k, v in CAMERA.items() if k != 'world_from_camera'}))
     yield 'p.json', [], dict(params, **file_of('env_params', 'p.json', '{"projection": "square"}'))
     yield 'radius', ['--env-projection', 'angular'], dict(
         params, **file_of('env_params', 'p.json', '{"radius": -3}'))

@@ -10,6 +10,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import run_tests  # noqa: E402
 from run import GNOMON, Run  # noqa: E402
 
@@ -110,6 +111,12 @@ def test_values():
             (['track', '--object', 'a', '--poses', 'none'], ['none: cannot open']),
             (['calibrate', 'response', '--chart', 'none', '--out', 'x'], ['none: no file there'])):
         Run(*arguments).fail(1, *words)
+    with Folder() as folder:
+        lens = folder.write('lens.json', b'{"width": 64, "height": 48, "fx": 32, "fy": 32, "cx": 32, "cy": 24,'
+                            b' "distortion": [0, 0, 0, 0, 0]}')
+        Run('view', '--files', 'none', '--camera', lens, '--out', 'o').fail(
+            1, 'nothing says where the camera is: give --marker DICT:ID:SIZE or --markers FILE',
+            'or world_from_camera in ' + lens)
     Run('probe', '--files', sys.argv[0], '--server', '127.0.0.1:0').fail(1, '[1, 65535]')
     for size in ('640', '640x', 'x480', '0x480', '640x480x3', '99999x480'):
         Run('probe', '--gige', 'any', '--frame-size', size).fail(1, '--frame-size %s: ' % size,

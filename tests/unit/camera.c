@@ -258,7 +258,7 @@ static void test_read_errors(void **unused)
         {"{" SIZES LENS POSE ",\"distorsion\":0}",
          ": unknown key 'distorsion'; did you mean 'distortion'?"},
         {"{" SIZES LENS POSE ",\"fov\":0}", ": unknown key 'fov'; known are width, height, fx, fy"},
-        {"{" SIZES LENS "}", ": world_from_camera: missing, expected an array"},
+        {"{" SIZES LENS "}", ": world_from_camera: missing: where the camera is, 16 numbers"},
         {"{" LENS "}", ": not JSON"},
         {"{\"width\":\"640\"}", ": width: expected a whole number, found a string"},
         {"{\"width\":640.5}", ": width: expected a whole number in [1, 16384], found 640.5"},
