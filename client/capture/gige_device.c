@@ -1,10 +1,14 @@
 /* SPDX-FileCopyrightText: 2026 the Gnomon authors */
 /* SPDX-License-Identifier: ISC */
+#define _GNU_SOURCE // gettid
 #include "client/capture/gige_device.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <arv.h>
 
@@ -293,6 +297,15 @@ double gn_gige_device_get_exposure(const struct gn_gige_device *device, ArvBuffe
     return is_good ? us : 0;
 }
 
+/** Called in Aravis' thread that takes packets, first when it begins. */
+static void note_receiver(void *context, ArvStreamCallbackType type, ArvBuffer *buffer)
+{
+    atomic_int *receiver = context;
+    (void)buffer;
+    if (type == ARV_STREAM_CALLBACK_TYPE_INIT)
+        atomic_store(receiver, gettid());
+}
+
 static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *place,
                         struct gn_error *out_error)
 {
@@ -304,7 +317,10 @@ static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *pl
         return gn_error_set(
             out_error, -EINVAL, "camera %s: %zu bytes a picture announced, but %dx%d %s has %zu",
             place->id, payload, d->width, d->height, d->format->name, d->picture_bytes);
-    d->stream = arv_camera_create_stream(d->camera, NULL, NULL, &error);
+    d->receiver = calloc(1, sizeof(*d->receiver));
+    if (!d->receiver)
+        return gn_error_set(out_error, -ENOMEM, "out of memory");
+    d->stream = arv_camera_create_stream(d->camera, note_receiver, d->receiver, &error);
     if (!d->stream || error)
         return set_arv_error(out_error, -EIO, place, "cannot open its stream", &error);
     g_object_set(d->stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED,
@@ -369,6 +385,20 @@ bool gn_gige_device_is_ours(const struct gn_gige_device *device)
     return arv_gv_device_is_controller(ARV_GV_DEVICE(arv_camera_get_device(device->camera)));
 }
 
+bool gn_gige_device_has_read_all(const struct gn_gige_device *device)
+{
+    char path[64], text[64] = "";
+    snprintf(path, sizeof(path), "/proc/self/task/%d/stat", atomic_load(device->receiver));
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd >= 0) {
+        (void)!read(fd, text, sizeof(text) - 1);
+        close(fd);
+    }
+    // "ID (NAME) STATE ...", proc(5); where it cannot be read nothing speaks against it.
+    const char *state = strrchr(text, ')');
+    return !state || state[1] != ' ' || state[2] == 'S';
+}
+
 uint64_t gn_gige_device_count_packets(const struct gn_gige_device *device)
 {
     return arv_stream_get_info_uint64_by_name(device->stream, "n_received_packets");
@@ -379,6 +409,8 @@ void gn_gige_device_close(struct gn_gige_device *device)
     if (device->camera && device->stream)
         arv_camera_stop_acquisition(device->camera, NULL);
     g_clear_object(&device->chunks);
-    g_clear_object(&device->stream);
+    g_clear_object(&device->stream); // ends its thread
     g_clear_object(&device->camera);
+    free(device->receiver);
+    device->receiver = NULL;
 }

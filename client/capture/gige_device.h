@@ -7,6 +7,7 @@
 #ifndef GN_CLIENT_CAPTURE_GIGE_DEVICE_H
 #define GN_CLIENT_CAPTURE_GIGE_DEVICE_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -23,6 +24,7 @@ struct gn_gige_device {
     struct _ArvCamera *camera;      // ArvCamera
     struct _ArvStream *stream;      // ArvStream
     struct _ArvChunkParser *chunks; // ArvChunkParser; NULL: it sends no stamps in chunks
+    atomic_int *receiver;           // atomic: id of Aravis' thread that takes packets
     double ns_per_tick;             // of the stamps in chunks
     const struct gn_pixels_format *format;
     int width, height;
@@ -71,6 +73,9 @@ void gn_gige_device_read_exposure(struct gn_gige_device *device);
 /** Whether the camera is still under our control, as far as its heartbeat has told by now: each
  * second, and 5 s more where it does not answer at all. */
 bool gn_gige_device_is_ours(const struct gn_gige_device *device);
+
+/** Whether Aravis has read every packet that came: its thread sleeps until there are more. */
+bool gn_gige_device_has_read_all(const struct gn_gige_device *device);
 
 /** Packets of pictures that have come since it was opened. */
 uint64_t gn_gige_device_count_packets(const struct gn_gige_device *device);

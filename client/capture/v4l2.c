@@ -17,6 +17,10 @@
 /** Least time without a picture after which a camera is opened again, and that for the first. */
 #define STALL_NS GN_NS_PER_S
 #define FIRST_STALL_NS (5 * GN_NS_PER_S)
+/** Most of the time from one look for a picture to the next that counts as the camera's silence:
+ * the waits of a read and of its reader. Where it was longer this program or the machine stood
+ * still. */
+#define MOST_SILENCE_NS (2 * GN_SOURCE_WAIT_MS * GN_NS_PER_MS)
 /** Frame time where the driver does not say. */
 #define DEFAULT_FRAME_NS GN_NS_PER_S
 /** A time of the driver may lie so far in the past, and in the future: some compute it. */
@@ -35,7 +39,8 @@ struct v4l2_source {
     struct gn_v4l2_exposure exposure;
     double asked_us;      // options.exposure_us while the exposure is held
     bool has_picture;     // one has come since this opening
-    int64_t last_ns;      // when, or of the opening
+    int64_t looked_ns;    // when one was last looked for; before that, of the opening
+    int64_t silent_ns;    // how long none has come
     int64_t given_ns;     // the last picture's time
     int64_t retry_ns;     // when a lost camera is looked for next
     struct gn_error news; // to be told
@@ -107,7 +112,8 @@ static int start(struct v4l2_source *s, const char *path, struct gn_error *out_e
     s->options.pixel_format = s->layout.pixels->name;
     s->head.fd = s->device.fd;
     s->has_picture = false;
-    s->last_ns = now_ns(s);
+    s->silent_ns = 0;
+    s->looked_ns = now_ns(s);
     return 0;
 }
 
@@ -181,7 +187,8 @@ static void give(struct v4l2_source *s, const struct gn_v4l2_picture *p, struct 
     };
     s->given_ns = out->time_ns;
     s->has_picture = true;
-    s->last_ns = now_ns(s);
+    s->silent_ns = 0;
+    s->looked_ns = now_ns(s);
 }
 
 /** Hands out what there is to tell. Returns -EAGAIN. */
@@ -214,14 +221,18 @@ static int look_for(struct v4l2_source *s, struct gn_error *out_error)
     return tell(s, out_error);
 }
 
-/** Whether no picture has come for so long that the camera should be opened again. */
-static bool is_stalled(const struct v4l2_source *s)
+/** A look that found nothing: whether no picture has come for so long that the camera should be
+ * opened again. */
+static bool is_stalled(struct v4l2_source *s)
 {
+    int64_t now = now_ns(s), since_ns = now - s->looked_ns;
+    s->looked_ns = now;
+    s->silent_ns += since_ns < MOST_SILENCE_NS ? since_ns : MOST_SILENCE_NS;
     int64_t frame_ns = s->frame_ns ? s->frame_ns : DEFAULT_FRAME_NS;
     int64_t exposure_ns = (int64_t)(s->options.exposure_us * 1e3);
     int64_t limit_ns = GN_SOURCE_MISSING_FRAMES * (frame_ns > exposure_ns ? frame_ns : exposure_ns);
     int64_t least_ns = s->has_picture ? STALL_NS : FIRST_STALL_NS;
-    return now_ns(s) - s->last_ns > (limit_ns > least_ns ? limit_ns : least_ns);
+    return s->silent_ns > (limit_ns > least_ns ? limit_ns : least_ns);
 }
 
 /** Whether the driver says that what comes in is no longer what was set. */

@@ -312,6 +312,40 @@ def test_silence():
             assert lamp.end()[1] == ''
 
 
+def find_thread(process, name):
+    """The id of its thread of that name."""
+    for thread in os.listdir('/proc/%d/task' % process.pid):
+        with open('/proc/%d/task/%s/comm' % (process.pid, thread)) as f:
+            if f.read() == name + '\n':
+                return int(thread)
+    raise AssertionError('no thread ' + name)
+
+
+def test_overload():
+    """A client that does not run, or whose packets are not read, for longer than the camera may be
+    silent, does not take it for lost."""
+    rate = 10
+    patience_s = 5 / rate
+    with Camera(*size()):
+        tool = Program(TOOL, '127.0.0.1', 'Mono12', str(WIDTH), str(HEIGHT), str(rate), '30', 'deep')
+        tool.wait_for('^4 ')
+        cpu = min(os.sched_getaffinity(0))
+        receiver = find_thread(tool.process, 'arv_gv_stream')
+        os.sched_setaffinity(receiver, {cpu})
+        os.sched_setscheduler(receiver, os.SCHED_IDLE, os.sched_param(0))
+        busy = [subprocess.Popen(['taskset', '-c', str(cpu), 'sh', '-c', 'while :; do :; done'])
+                for _ in range(3)]
+        time.sleep(3 * patience_s)
+        for process in busy:
+            process.kill()
+            process.wait()
+        tool.process.send_signal(signal.SIGSTOP)
+        time.sleep(2 * patience_s)
+        tool.process.send_signal(signal.SIGCONT)
+        out, err = tool.end()
+    assert err == '' and json.loads(out.splitlines()[-1])['reopened'] == 0, (out[-500:], err)
+
+
 def test_packet_size():
     """Packets that are too large for the network become smaller ones."""
     with Daemon() as daemon, Given() as folder, Camera(*size(), '--max-packet', '1500'):
@@ -393,5 +427,5 @@ def test_settings():
 
 own_network.enter()
 run_tests([test_formats, test_stock, test_ordinary_user, test_loss, test_times, test_restart,
-           test_view, test_controller, test_triggers, test_silence, test_packet_size,
+           test_view, test_controller, test_triggers, test_silence, test_overload, test_packet_size,
            test_hostile_places, test_hostile, test_settings])

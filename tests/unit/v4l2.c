@@ -373,6 +373,36 @@ static void test_a_camera_that_stalls_is_opened_again(void **state)
     gn_fake_finish(&fake);
 }
 
+/* Where the machine stood still, and its cameras with it, nothing was looked for. */
+static void test_time_not_looked_at_is_no_silence(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    struct gn_source *source = open_camera(&fake, NULL);
+    fake.now_ns += GN_NS_PER_S * 30; // before the first picture, too
+    expect_news(source, "");
+    for (uint32_t i = 0; i < 20; i++) {
+        gn_fake_fill(&fake, i, 128);
+        read_picture(source);
+        fake.now_ns += GN_NS_PER_S * 3;
+        expect_news(source, "");
+        expect_news(source, "");
+    }
+    assert_int_equal(fake.n_opened, 1);
+    int64_t still_ns = fake.now_ns;
+    struct gn_capture capture;
+    struct gn_error error = {0};
+    for (int i = 0; !error.text[0] && i < 100; i++) { // a reader that seldom looks finds out, too
+        fake.now_ns += GN_NS_PER_S;
+        assert_int_equal(gn_source_read(source, &capture, &error), -EAGAIN);
+    }
+    assert_non_null(strstr(error.text, "no picture comes any more"));
+    assert_in_range(fake.now_ns - still_ns, 8 * GN_NS_PER_S, 12 * GN_NS_PER_S);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 static void bend_width(struct v4l2_pix_format *pix)
 {
     pix->width = 0;
@@ -678,6 +708,7 @@ int main(void)
         cmocka_unit_test(test_what_comes_back_gives_the_same_pictures),
         cmocka_unit_test(test_what_comes_back_is_not_the_camera),
         cmocka_unit_test(test_a_camera_that_stalls_is_opened_again),
+        cmocka_unit_test(test_time_not_looked_at_is_no_silence),
         cmocka_unit_test(test_drivers_that_lie_at_the_start),
         cmocka_unit_test(test_drivers_that_lie_about_buffers),
         cmocka_unit_test(test_drivers_without_end),
