@@ -108,9 +108,8 @@ int gn_feed_keep_clock(struct gn_feed *r, struct gn_error *out_error)
     if (now_ns - r->clock_ns < 60 * GN_NS_PER_S)
         return 0;
     r->clock_ns = now_ns;
-    int err = gn_client_sync_clock(r->client, 4, 5000);
-    // A server too busy to answer now leaves us with the clock we have.
-    return err && err != -ETIMEDOUT ? gn_cmd_set_fault(r->client, err, out_error) : 0;
+    int err = gn_client_begin_clock_sync(r->client, 4);
+    return err ? gn_cmd_set_fault(r->client, err, out_error) : 0;
 }
 
 static int serve_until(struct gn_feed *r, int64_t due_ns, struct gn_error *out_error)
@@ -139,31 +138,38 @@ int gn_feed_wait_last(struct gn_feed *r, struct gn_error *out_error)
     return serve_until(r, gn_clock_get_monotonic_ns() + LAST_WORDS_NS, out_error);
 }
 
-/** Until the camera or the server has something, for GN_SOURCE_WAIT_MS at most. */
-static void wait_for_either(const struct gn_feed *r)
+/** Until the camera has something or look_ns, then true; or until the server alone has. */
+static bool wait_for_camera(const struct gn_feed *r, int64_t look_ns)
 {
-    if (r->source->fd < 0)
-        return; // reading waits
+    int64_t left_ns = look_ns - gn_clock_get_monotonic_ns();
+    if (r->source->fd < 0 || left_ns <= 0)
+        return true;
     struct pollfd fds[] = {{.fd = gn_client_get_fd(r->client), .events = POLLIN},
-                           {.fd = r->source->fd, .events = POLLIN}};
-    (void)!poll(fds, 2, GN_SOURCE_WAIT_MS); // a signal is seen by who serves
+                           {.fd = r->source->fd, .events = POLLIN | POLLPRI}};
+    (void)!poll(fds, 2, (int)(left_ns / GN_NS_PER_MS) + 1); // a signal is seen by who serves
+    return !fds[0].revents || fds[1].revents;
 }
 
-/** Serves the connection and reads the camera until it has a picture. As gn_source_read. */
+/** Serves the connection and reads the camera until it has a picture. As gn_source_read. Reading
+ * waits, so it comes when there is a picture, but every GN_SOURCE_WAIT_MS: a camera that is lost is
+ * found by looking. */
 static int read_live(const struct gn_feed_command *command, struct gn_feed *r,
                      struct gn_capture *out, struct gn_error *out_error)
 {
+    int64_t look_ns = gn_clock_get_monotonic_ns() + GN_SOURCE_WAIT_MS * GN_NS_PER_MS;
     for (;;) {
         int err = command->serve ? command->serve(r, out_error)
                                  : serve_until(r, gn_clock_get_monotonic_ns(), out_error);
         if (err)
             return err;
+        if (!wait_for_camera(r, look_ns))
+            continue;
         int got = gn_source_read(r->source, out, out_error);
         if (got != -EAGAIN)
             return got;
         if (out_error->text[0])
             gn_cmd_fail(r->program, out_error->text);
-        wait_for_either(r);
+        look_ns = gn_clock_get_monotonic_ns() + GN_SOURCE_WAIT_MS * GN_NS_PER_MS;
     }
 }
 

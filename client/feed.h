@@ -146,8 +146,8 @@ int64_t gn_feed_get_due_ns(struct gn_feed *r, const struct gn_capture *capture);
 /** Milliseconds to wait in one gn_client_poll: until due_ns, but Ctrl-C must be seen meanwhile. */
 int gn_feed_get_timeout_ms(int64_t due_ns);
 
-/** Measures the clock again where that was a minute ago. Returns 0, or a negative errno and a
- * sentence: the connection is lost. */
+/** Begins to measure the clock again where that was a minute ago; who serves the connection takes
+ * the answers. Returns 0, or a negative errno and a sentence: the connection is lost. */
 GN_MUST_USE int gn_feed_keep_clock(struct gn_feed *r, struct gn_error *out_error);
 
 /**

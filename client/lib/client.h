@@ -31,13 +31,14 @@ struct gn_client {
     int timeout_ms;
     bool (*is_given_up)(void *ctx); // NULL: nobody is asked, as once connected
     void *is_given_up_ctx;
-    int lost;                // the errno that ended the connection, 0 while it is good
-    int64_t last_sent_ns;    // own clock
-    int64_t offset_ns;       // server minus own clock
-    int64_t round_trip_ns;   // of the sample that gave offset_ns
-    int64_t pong_sent_ns;    // t1 of the PING that is being waited for, 0 none
-    struct gn_msg_pong pong; // its answer
-    int64_t pong_received_ns;
+    int lost;               // the errno that ended the connection, 0 while it is good
+    int64_t last_sent_ns;   // own clock
+    int64_t offset_ns;      // server minus own clock
+    int64_t round_trip_ns;  // of the sample that gave offset_ns
+    int64_t ping_sent_ns;   // t1 of the PING whose answer is a sample; 0: none is out
+    int samples_left;       // of the measurement under way, with that one; 0: none is under way
+    int64_t best_offset_ns; // of its samples
+    int64_t best_trip_ns;   // INT64_MAX: none yet
     struct gn_conn_message kept[GN_CLIENT_MAX_KEPT]; // events that came while a PONG was waited for
     uint8_t *kept_headers[GN_CLIENT_MAX_KEPT];       // owned copies of their headers
     size_t kept_first, kept_count;

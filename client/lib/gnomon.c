@@ -74,6 +74,47 @@ int gn_client_get_fd(const struct gn_client *client)
     return gn_conn_get_fd(client->conn);
 }
 
+/** Sends the PING of the next sample. */
+static int send_sample(struct gn_client *client)
+{
+    struct gn_msg_ping ping = {.t1_ns = gn_clock_get_monotonic_ns()};
+    client->ping_sent_ns = ping.t1_ns;
+    return gn_client_send(client, GN_WIRE_PING, &ping, NULL, 0);
+}
+
+/** Ends the measurement with the best of its samples. Returns whether there was one. */
+static bool end_samples(struct gn_client *client)
+{
+    client->samples_left = 0;
+    client->ping_sent_ns = 0;
+    if (client->best_trip_ns == INT64_MAX)
+        return false;
+    client->round_trip_ns = client->best_trip_ns;
+    client->offset_ns = client->best_offset_ns;
+    return true;
+}
+
+/** The answer to a PING; where it is a sample the next one is sent, or all are there. */
+static int take_pong(struct gn_client *client, const struct gn_msg_pong *pong, int64_t received_ns)
+{
+    if (client->ping_sent_ns == 0 || pong->t1_ns != client->ping_sent_ns)
+        return 0;
+    client->ping_sent_ns = 0;
+    // RFC 5905, section 8: offset and delay of four timestamps. The differences of hostile clocks
+    // may not overflow: unsigned arithmetic wraps.
+    uint64_t t1 = (uint64_t)pong->t1_ns, t2 = (uint64_t)pong->t2_ns;
+    uint64_t t3 = (uint64_t)pong->t3_ns, t4 = (uint64_t)received_ns;
+    int64_t trip = (int64_t)(t4 - t1 - (t3 - t2));
+    if (trip >= 0 && trip < client->best_trip_ns) {
+        client->best_trip_ns = trip;
+        client->best_offset_ns = (int64_t)(t2 - t1) / 2 + (int64_t)(t3 - t4) / 2;
+    }
+    if (--client->samples_left > 0)
+        return send_sample(client);
+    (void)!end_samples(client);
+    return 0;
+}
+
 /** PING and PONG end here. Returns 1 where the message was one of them, 0, or a negative errno. */
 static int deal_inside(struct gn_client *client, const struct gn_conn_message *message,
                        int64_t received_ns)
@@ -83,19 +124,13 @@ static int deal_inside(struct gn_client *client, const struct gn_conn_message *m
         return 0;
     union gn_wire_message m;
     int err = gn_client_decode(client, message, &m);
-    if (err)
-        return err;
-    if (type == GN_WIRE_PONG) {
-        if (client->pong_sent_ns != 0 && m.pong.t1_ns == client->pong_sent_ns) {
-            client->pong = m.pong;
-            client->pong_received_ns = received_ns;
-            client->pong_sent_ns = 0;
-        }
-        return 1;
+    if (!err && type == GN_WIRE_PONG)
+        err = take_pong(client, &m.pong, received_ns);
+    else if (!err) {
+        struct gn_msg_pong pong = {
+            .t1_ns = m.ping.t1_ns, .t2_ns = received_ns, .t3_ns = gn_clock_get_monotonic_ns()};
+        err = gn_client_send(client, GN_WIRE_PONG, &pong, NULL, 0);
     }
-    struct gn_msg_pong pong = {
-        .t1_ns = m.ping.t1_ns, .t2_ns = received_ns, .t3_ns = gn_clock_get_monotonic_ns()};
-    err = gn_client_send(client, GN_WIRE_PONG, &pong, NULL, 0);
     return err ? err : 1;
 }
 
@@ -117,54 +152,39 @@ static int keep(struct gn_client *client, struct gn_conn_message *message)
     return 0;
 }
 
-/** One PING and its PONG. Returns 1, 0 at the deadline, negative errno. */
-static int ping_once(struct gn_client *client, int64_t deadline_ns)
-{
-    struct gn_msg_ping ping = {.t1_ns = gn_clock_get_monotonic_ns()};
-    client->pong_sent_ns = ping.t1_ns;
-    int err = gn_client_send(client, GN_WIRE_PING, &ping, NULL, 0);
-    while (!err && client->pong_sent_ns != 0) {
-        struct gn_conn_message message;
-        int n = gn_client_receive(client, deadline_ns, &message);
-        if (n <= 0) {
-            client->pong_sent_ns = 0;
-            return n;
-        }
-        n = deal_inside(client, &message, gn_clock_get_monotonic_ns());
-        err = n < 0 ? n : n == 0 ? keep(client, &message) : 0;
-    }
-    return err ? err : 1;
-}
-
-int gn_client_sync_clock(struct gn_client *client, int samples, int timeout_ms)
+static int begin_samples(struct gn_client *client, int samples)
 {
     if (samples < 1 || samples > 64)
         return gn_client_fail(&client->fault, -EINVAL, "%d clock samples, must be in [1, 64]",
                               samples);
+    client->samples_left = samples;
+    client->best_trip_ns = INT64_MAX;
+    return send_sample(client);
+}
+
+int gn_client_begin_clock_sync(struct gn_client *client, int samples)
+{
+    return client->samples_left > 0 ? client->lost : begin_samples(client, samples);
+}
+
+int gn_client_sync_clock(struct gn_client *client, int samples, int timeout_ms)
+{
     int64_t deadline = gn_client_get_deadline(timeout_ms);
-    int64_t best_trip = INT64_MAX, best_offset = 0;
-    for (int i = 0; i < samples; i++) {
-        int n = ping_once(client, deadline);
-        if (n < 0)
-            return n;
+    int err = begin_samples(client, samples);
+    while (!err && client->samples_left > 0) {
+        struct gn_conn_message message;
+        int n = gn_client_receive(client, deadline, &message);
         if (n == 0)
             break;
-        // RFC 5905, section 8: offset and delay of four timestamps. The differences of hostile
-        // clocks may not overflow: unsigned arithmetic wraps.
-        uint64_t t1 = (uint64_t)client->pong.t1_ns, t2 = (uint64_t)client->pong.t2_ns;
-        uint64_t t3 = (uint64_t)client->pong.t3_ns, t4 = (uint64_t)client->pong_received_ns;
-        int64_t trip = (int64_t)(t4 - t1 - (t3 - t2));
-        int64_t offset = (int64_t)(t2 - t1) / 2 + (int64_t)(t3 - t4) / 2;
-        if (trip >= 0 && trip < best_trip) {
-            best_trip = trip;
-            best_offset = offset;
-        }
+        if (n > 0)
+            n = deal_inside(client, &message, gn_clock_get_monotonic_ns());
+        err = n < 0 ? n : n == 0 ? keep(client, &message) : 0;
     }
-    if (best_trip == INT64_MAX)
+    if (err)
+        return err;
+    if (!end_samples(client))
         return gn_client_fail(&client->fault, -ETIMEDOUT, "no usable answer to PING within %d ms",
                               timeout_ms);
-    client->round_trip_ns = best_trip;
-    client->offset_ns = best_offset;
     return 0;
 }
 

@@ -78,11 +78,18 @@ int gn_client_get_fd(const struct gn_client *client);
 /**
  * Send `samples` PINGs [1, 64] one after another and keep the offset of the one with the shortest
  * round trip (four timestamps: PROTOCOL.md, "Clock"). Events that arrive meanwhile are kept for
- * gn_client_poll(), at most 64. Do it after connecting and every minute or so. Returns 0,
- * -ETIMEDOUT (no answer to any within timeout_ms), -EINVAL, -ENOBUFS (too many events kept), or as
- * gn_client_poll().
+ * gn_client_poll(), at most 64. Do it after connecting. Returns 0, -ETIMEDOUT (no answer to any
+ * within timeout_ms), -EINVAL, -ENOBUFS (too many events kept), or as gn_client_poll().
  */
 GN_MUST_USE int gn_client_sync_clock(struct gn_client *client, int samples, int timeout_ms);
+
+/**
+ * The same without waiting, for every minute or so: the first PING goes out now, gn_client_poll()
+ * takes each answer when it comes and sends the next, and the offset changes with the last of them;
+ * until then it stays. An answer counts from when it is read: poll often meanwhile. Does nothing
+ * while such a measurement is under way. Returns 0, -EINVAL, or as gn_client_send_frame().
+ */
+GN_MUST_USE int gn_client_begin_clock_sync(struct gn_client *client, int samples);
 
 /** Own monotonic clock, ns (CLOCK_MONOTONIC). */
 int64_t gn_client_now_ns(void);

@@ -31,6 +31,8 @@ struct server {
     struct gn_msg_error error;               // for SCRIPT_ERROR
     struct gn_msg_welcome welcome;           // for SCRIPT_SERVE
     struct gn_msg_hello hello;               // owner: server's thread until joined
+    atomic_llong ahead_ns;                   // atomic: of its clock
+    atomic_bool is_busy;                     // atomic: PINGs wait until a CAMERA comes
     atomic_int seen[GN_WIRE_STATISTICS + 1]; // atomic: messages of each type that came
     size_t frame_bytes;                      // owner: server's thread until joined
     pthread_t thread;
@@ -69,10 +71,17 @@ static void answer_frame(struct gn_conn *conn, const struct gn_msg_frame *frame,
     answer(conn, GN_WIRE_RESULT, &result, picture);
 }
 
+static void answer_ping(struct server *s, struct gn_conn *conn, int64_t t1_ns)
+{
+    int64_t now = gn_clock_get_monotonic_ns() + atomic_load(&s->ahead_ns);
+    answer(conn, GN_WIRE_PONG, &(struct gn_msg_pong){t1_ns, now, now}, NULL);
+}
+
 static void serve(struct server *s, struct gn_conn *conn)
 {
     struct gn_conn_message message;
     union gn_wire_message m;
+    int64_t waiting_ns = 0; // t1 of a PING that waits; 0: none
     answer(conn, GN_WIRE_WELCOME, &s->welcome, NULL);
     while (next(conn, &message, &m)) {
         atomic_fetch_add(&s->seen[message.envelope.type], 1);
@@ -81,8 +90,13 @@ static void serve(struct server *s, struct gn_conn *conn)
             struct gn_msg_statistics statistics = {.sessions = 3};
             if (s->hello.want_statistics)
                 answer(conn, GN_WIRE_STATISTICS, &statistics, NULL);
-            int64_t now = gn_clock_get_monotonic_ns() + SERVER_AHEAD_NS;
-            answer(conn, GN_WIRE_PONG, &(struct gn_msg_pong){m.ping.t1_ns, now, now}, NULL);
+            if (atomic_load(&s->is_busy))
+                waiting_ns = m.ping.t1_ns;
+            else
+                answer_ping(s, conn, m.ping.t1_ns);
+        } else if (message.envelope.type == GN_WIRE_CAMERA && waiting_ns) {
+            answer_ping(s, conn, waiting_ns);
+            waiting_ns = 0;
         } else if (message.envelope.type == GN_WIRE_ENVIRONMENT_FRAME) {
             answer(conn, GN_WIRE_PING, &(struct gn_msg_ping){77}, NULL);
         } else if (message.envelope.type == GN_WIRE_FRAME) {
@@ -129,6 +143,7 @@ static void start_server(struct server *s, enum script script)
 {
     memset(s, 0, sizeof(*s));
     s->script = script;
+    atomic_store(&s->ahead_ns, SERVER_AHEAD_NS);
     s->welcome =
         (struct gn_msg_welcome){.version = 1, .session_id = 42, .max_frames_outstanding = 1};
     s->listener = socket(AF_INET, SOCK_STREAM, 0);
@@ -272,6 +287,52 @@ static void test_session(void **state)
     assert_int_equal(s.seen[GN_WIRE_BYE], 1);
 }
 
+/* A server that does not answer is not waited for: the clock stays as it was, all else goes on. */
+static void test_clock_is_measured_meanwhile(void **state)
+{
+    (void)state;
+    struct server s;
+    start_server(&s, SCRIPT_SERVE);
+    run(&s);
+    struct gn_client_options opts = viewer(&s);
+    struct gn_client *client;
+    struct gn_client_event event;
+    assert_int_equal(gn_client_connect(&opts, &client, NULL), 0);
+    assert_int_equal(gn_client_sync_clock(client, 4, 5000), 0);
+    int64_t before_ns = gn_client_get_clock_offset_ns(client);
+    int64_t ahead_ns = SERVER_AHEAD_NS + GN_NS_PER_S;
+    atomic_store(&s.ahead_ns, ahead_ns);
+    atomic_store(&s.is_busy, true);
+    assert_int_equal(gn_client_begin_clock_sync(client, 65), -EINVAL);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(gn_client_begin_clock_sync(client, 3), 0);
+        send_and_receive(client, &s);
+        assert_int_equal(s.seen[GN_WIRE_PING], 5); // the one that waits
+        assert_int_equal(gn_client_get_clock_offset_ns(client), before_ns);
+    }
+    atomic_store(&s.is_busy, false);
+    struct gn_msg_camera camera = {.width = 4, .height = 2, .fx = 1, .fy = 1};
+    assert_int_equal(gn_client_send_camera(client, &camera), 0);
+    for (int i = 0; i < 250 && gn_client_get_clock_offset_ns(client) == before_ns; i++)
+        assert_int_equal(gn_client_poll(client, 20, &event), 0);
+    assert_int_equal(s.seen[GN_WIRE_PING], 7); // and two more
+    int64_t trip_ns = gn_client_get_round_trip_ns(client);
+    assert_true(llabs(gn_client_get_clock_offset_ns(client) - ahead_ns) <= trip_ns / 2 + 1);
+
+    // What is under way does not hinder one that waits; nor does one that failed what comes later.
+    atomic_store(&s.is_busy, true);
+    assert_int_equal(gn_client_begin_clock_sync(client, 3), 0);
+    assert_int_equal(gn_client_sync_clock(client, 4, 30), -ETIMEDOUT);
+    atomic_store(&s.is_busy, false);
+    atomic_store(&s.ahead_ns, SERVER_AHEAD_NS);
+    assert_int_equal(gn_client_sync_clock(client, 4, 5000), 0);
+    trip_ns = gn_client_get_round_trip_ns(client);
+    assert_true(llabs(gn_client_get_clock_offset_ns(client) - SERVER_AHEAD_NS) <= trip_ns / 2 + 1);
+    assert_int_equal(gn_client_bye(client, GN_MSG_BYE_REASON_DONE), 0);
+    gn_client_destroy(&client);
+    stop_server(&s);
+}
+
 static void test_redirect_is_followed_once(void **state)
 {
     (void)state;
@@ -385,8 +446,11 @@ static void test_keepalive(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_session),   cmocka_unit_test(test_redirect_is_followed_once),
-        cmocka_unit_test(test_refusals),  cmocka_unit_test(test_nobody_there),
+        cmocka_unit_test(test_session),
+        cmocka_unit_test(test_clock_is_measured_meanwhile),
+        cmocka_unit_test(test_redirect_is_followed_once),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_nobody_there),
         cmocka_unit_test(test_keepalive),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
