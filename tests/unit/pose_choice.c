@@ -77,12 +77,35 @@ static void fits_exact_points_exactly(void **state)
         assert_true(get_distance(&fits[0].camera_from_body, &pose) < 1e-7);
         assert_true(gn_rotation_get_angle(fits[0].camera_from_body.rotation, pose.rotation) < 1e-6);
         assert_true(fits[0].rms_px < 1e-6);
-        // A body that is not flat has one pose.
-        see(&camera, &pose, corner, 8, 0, seen);
-        n = gn_pose_fit_points(&camera, corner, (const double(*)[2])seen, 8, 0.1, fits, NULL);
-        assert_int_equal(n, 1);
-        assert_true(get_distance(&fits[0].camera_from_body, &pose) < 1e-7);
+        // A body that is not flat has one pose, be it a hundredth as high as it is wide.
+        for (int height = 0; height < 2; height++) {
+            double body[8][3];
+            memcpy(body, corner, sizeof(body));
+            for (int k = 0; k < 8; k++)
+                body[k][2] *= height ? 0.01 : 1;
+            see(&camera, &pose, (const double(*)[3])body, 8, 0, seen);
+            n = gn_pose_fit_points(&camera, (const double(*)[3])body, (const double(*)[2])seen, 8,
+                                   0.1, fits, NULL);
+            assert_int_equal(n, 1);
+            assert_true(get_distance(&fits[0].camera_from_body, &pose) < 1e-7);
+        }
     }
+}
+
+static void seen_face_on_both_poses_are_one(void **state)
+{
+    (void)state;
+    if (!gn_vision_is_built())
+        return;
+    struct gn_camera camera = get_camera();
+    struct gn_pose_fit fits[2];
+    double seen[4][2];
+    struct gn_pose pose = get_pose(0, 0, 0.5);
+    pose.translation[0] = pose.translation[1] = 0;
+    see(&camera, &pose, square, 4, 0, seen);
+    assert_int_equal(
+        gn_pose_fit_points(&camera, square, (const double(*)[2])seen, 4, 0.1, fits, NULL), 1);
+    assert_true(get_distance(&fits[0].camera_from_body, &pose) < 1e-7);
 }
 
 /** The sum of squared distances in the picture, by the camera's own projection. */
@@ -187,6 +210,7 @@ static int count_flips(bool is_chosen, int n_frames, double noise_px, int *out_n
         int n = gn_pose_fit_points(&camera, square, (const double(*)[2])seen, 4, 0.1, fits, NULL);
         if (n < 1)
             continue;
+        assert_true(n == 1 || fits[0].sum_px2 <= fits[1].sum_px2);
         int k = gn_pose_choice_update(&choice, i * INT64_C(33000000), fits, n, NULL);
         double best = gn_rotation_get_angle(fits[0].camera_from_body.rotation, pose.rotation);
         double mine =
@@ -243,15 +267,67 @@ static void a_wrong_beginning_is_corrected_by_evidence(void **state)
     assert_int_equal(gn_pose_choice_update(&choice, INT64_C(9033000000), fits, 2, &flip), 0);
 }
 
+/** Of how many pictures the other pose fits all but the first by so much better, in units of
+ * 0.25 px squared, until it is chosen; n where it never is. */
+static int wait_for_change(double by, int n)
+{
+    struct gn_pose_choice choice = {0};
+    struct gn_pose mine = get_pose(0.4, 0, 0.5), other = get_pose(-0.4, 0, 0.5);
+    struct gn_pose_fit fits[2] = {make_fit(&mine, 0), make_fit(&other, 0)};
+    int i = 0;
+    for (; i < n && gn_pose_choice_update(&choice, i * INT64_C(33000000), fits, 2, NULL) == 0; i++)
+        fits[0].sum_px2 = by * 0.25 * 0.25;
+    return i;
+}
+
+static void evidence_fades_with_half_a_second(void **state)
+{
+    (void)state;
+    // A sum of s a picture comes to s / (1 - exp(-0.033 / 0.5)) = 15.66 s in the end, and 12 change
+    // it: at 0.766 a picture.
+    assert_int_equal(wait_for_change(0.7, 400), 400);
+    assert_in_range(wait_for_change(0.8, 400), 45, 55); // 12.53 (1 - exp(-0.066 n)) = 12: 48
+}
+
+static void a_second_pose_begins_with_the_past_of_the_first(void **state)
+{
+    (void)state;
+    struct gn_pose_choice choice = {0};
+    struct gn_pose mine = get_pose(0.4, 0, 0.5), other = get_pose(-0.4, 0, 0.5);
+    struct gn_pose_fit fits[2] = {make_fit(&mine, 2), make_fit(&other, 0)};
+    assert_int_equal(gn_pose_choice_update(&choice, 0, fits, 1, NULL), 0);
+    assert_int_equal(gn_pose_choice_update(&choice, INT64_C(33000000), fits, 1, NULL), 0);
+    fits[0].sum_px2 = 0.02; // the bad pictures were as bad for both
+    assert_int_equal(gn_pose_choice_update(&choice, INT64_C(66000000), fits, 2, NULL), 0);
+    assert_int_equal(choice.n_changed, 0);
+}
+
+static void both_poses_are_matched_not_the_chosen_one_alone(void **state)
+{
+    (void)state;
+    struct gn_pose_choice choice = {0};
+    struct gn_pose a = get_pose(0, 0, 0.5), b = get_pose(0.8, 0, 0.5);
+    struct gn_pose near_a = get_pose(0.24, pi / 2, 0.5), between = get_pose(0.226, -pi / 4, 0.5);
+    struct gn_pose_fit before[2] = {make_fit(&a, 0), make_fit(&b, 0)};
+    struct gn_pose_fit fits[2] = {make_fit(&near_a, 0), make_fit(&between, 0)};
+    assert_int_equal(gn_pose_choice_update(&choice, 0, before, 2, NULL), 0);
+    // `between` is nearer to a by 0.01 rad, and to b by 0.2.
+    assert_int_equal(gn_pose_choice_update(&choice, INT64_C(33000000), fits, 2, NULL), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_exact_points_exactly),
+        cmocka_unit_test(seen_face_on_both_poses_are_one),
         cmocka_unit_test(no_pose_near_the_answer_fits_better),
         cmocka_unit_test(the_expected_error_is_the_one_that_comes),
         cmocka_unit_test(points_that_tell_nothing_give_no_pose),
         cmocka_unit_test(flips_are_rejected),
         cmocka_unit_test(a_wrong_beginning_is_corrected_by_evidence),
+        cmocka_unit_test(both_poses_are_matched_not_the_chosen_one_alone),
+        cmocka_unit_test(evidence_fades_with_half_a_second),
+        cmocka_unit_test(a_second_pose_begins_with_the_past_of_the_first),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
