@@ -61,6 +61,14 @@ static json_t *make_sessions(struct gn_room *room, bool *is_short)
     return list;
 }
 
+static json_t *make_ids(const uint64_t *ids, int n, bool *is_short)
+{
+    json_t *list = json_array();
+    for (int i = 0; i < n; i++)
+        append(list, json_integer((json_int_t)ids[i]), is_short);
+    return list;
+}
+
 static json_t *make_probes(struct gn_room *room, bool *is_short)
 {
     struct gn_probe_figures probes[GN_PROBES_MAX];
@@ -69,13 +77,14 @@ static json_t *make_probes(struct gn_room *room, bool *is_short)
     for (int i = 0; i < n; i++) {
         const struct gn_probe_figures *p = &probes[i];
         append(list,
-               json_pack("{s:I, s:b, s:[f, f, f], s:i, s:I, s:I, s:i, s:i, s:i, s:f, s:f}", //
+               json_pack("{s:I, s:b, s:[f, f, f], s:i, s:I, s:I, s:i, s:i, s:i, s:f, s:f, s:o}", //
                          "session", (json_int_t)p->session_id, "has_left", p->has_left,
                          "position_m", p->position[0], p->position[1], p->position[2], //
                          "lights", p->n_lights, "sequence", (json_int_t)p->sequence, "published",
                          (json_int_t)p->n_lit, "clipped_texels", p->n_clipped, "mended_texels",
                          p->n_mended, "out_of_gamut_texels", p->n_out_of_gamut, "rate_hz",
-                         p->rate_hz, "age_ms", get_ms_since(p->capture_ns)),
+                         p->rate_hz, "age_ms", get_ms_since(p->capture_ns), "same_place_as",
+                         make_ids(p->same_place, p->n_same_place, is_short)),
                is_short);
     }
     return list;

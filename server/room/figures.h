@@ -76,11 +76,17 @@ struct gn_session_figures {
     double last_latency_ms; // 0: none yet
 };
 
+/** Probes nearer to each other than this are told apart by nobody's ruler, m: two senders of one
+ * light, or positions that were never measured. */
+#define GN_PROBES_SAME_PLACE_M 0.01
+
 /** What can be read of one probe that has lit the room. */
 struct gn_probe_figures {
     uint64_t session_id;
     bool has_left;      // it is gone, but no other has lit the room since
     double position[3]; // m, world
+    int n_same_place;   // others that light the room from there: their light is averaged
+    uint64_t same_place[GN_PROBES_MAX]; // their sessions
     int n_lights;
     uint64_t sequence; // of its last frame that gave light
     uint64_t n_lit;    // such frames

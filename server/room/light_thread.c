@@ -148,6 +148,35 @@ static void warn_of_clipping(struct gn_room *room, uint64_t probe_id,
                room->name, (unsigned long long)probe_id, (unsigned long long)state->sequence, n);
 }
 
+/** Says once of each probe that another one's light is from the same place: the room then has the
+ * mean of both, which is seldom meant. */
+static void warn_of_same_place(struct gn_room *room, uint64_t probe_id)
+{
+    uint64_t others[GN_PROBES_MAX];
+    char name[64] = "";
+    gn_mutex_lock(&room->mu);
+    struct gn_room_session *s = gn_room_find_locked(room, probe_id);
+    int n = s && !s->was_doubled ? gn_probes_find_same_place(&room->probes, probe_id, others) : 0;
+    bool is_first = n > 0;
+    for (int i = 0; i < n; i++) { // one line says it of both
+        struct gn_room_session *other = gn_room_find_locked(room, others[i]);
+        if (other)
+            other->was_doubled = true;
+    }
+    if (is_first) {
+        s->was_doubled = true;
+        memcpy(name, s->figures.name, sizeof(name));
+    }
+    gn_mutex_unlock(&room->mu);
+    if (is_first)
+        gn_log(
+            GN_LOG_WARN,
+            "room %s: session %llu (%s) lights the room from the same place as session %llu: the "
+            "mean of both is taken; right would be one of them, or, in each one's setup, the "
+            "\"position\" where it stands",
+            room->name, (unsigned long long)probe_id, name, (unsigned long long)others[0]);
+}
+
 /** Makes the state, of the worked frame or NULL, its probe's light; takes both. */
 static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_state *state,
                     struct gn_worked_frame *worked, double ms_decode, bool is_same)
@@ -169,6 +198,7 @@ static void publish(struct gn_room *room, uint64_t probe_id, struct gn_lighting_
         gn_probe_finish(&old[i]);
     if (is_there) {
         warn_of_clipping(room, probe_id, mine);
+        warn_of_same_place(room, probe_id);
         gn_light_join(room);
         gn_mutex_lock(&room->mu);
         is_there = gn_light_is_reached_locked(room, mine->stream); // its probe may have left

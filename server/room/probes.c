@@ -3,6 +3,7 @@
 #include "server/room/probes.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -249,6 +250,31 @@ int gn_probes_get_lights(const struct gn_probes *probes,
     return n;
 }
 
+static const double *get_position(const struct gn_probe *probe)
+{
+    return probe->light->map->world_from_probe.translation;
+}
+
+int gn_probes_find_same_place(const struct gn_probes *probes, uint64_t session_id,
+                              uint64_t out_ids[static GN_PROBES_MAX])
+{
+    const struct gn_probe *mine = NULL;
+    int n = 0;
+    for (int i = 0; i < GN_PROBES_MAX; i++)
+        if (probes->slots[i].session_id == session_id && probes->slots[i].light)
+            mine = &probes->slots[i];
+    for (int i = 0; mine && i < GN_PROBES_MAX; i++) {
+        const struct gn_probe *p = &probes->slots[i];
+        if (p == mine || !p->light)
+            continue;
+        const double *a = get_position(mine), *b = get_position(p);
+        double apart = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+        if (apart < GN_PROBES_SAME_PLACE_M)
+            out_ids[n++] = p->session_id;
+    }
+    return n;
+}
+
 int gn_probes_get_figures(const struct gn_probes *probes,
                           struct gn_probe_figures out_figures[static GN_PROBES_MAX],
                           struct gn_time_window out_intervals[static GN_PROBES_MAX])
@@ -270,7 +296,8 @@ int gn_probes_get_figures(const struct gn_probes *probes,
                                        .n_mended = m->n_nan + m->n_inf + m->n_negative,
                                        .n_out_of_gamut = m->n_out_of_gamut,
                                        .capture_ns = p->light->capture_time_ns};
-        memcpy(f->position, p->light->map->world_from_probe.translation, sizeof(f->position));
+        memcpy(f->position, get_position(p), sizeof(f->position));
+        f->n_same_place = gn_probes_find_same_place(probes, p->session_id, f->same_place);
     }
     return n;
 }

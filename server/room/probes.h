@@ -111,6 +111,10 @@ uint64_t gn_probes_get_newest(const struct gn_probes *probes);
 int gn_probes_get_lights(const struct gn_probes *probes,
                          struct gn_lighting_state *out_lights[static GN_PROBES_MAX],
                          int *out_newest);
+/** Sessions of the other probes whose light is from the same place as this one's. Returns their
+ * number. */
+int gn_probes_find_same_place(const struct gn_probes *probes, uint64_t session_id,
+                              uint64_t out_ids[static GN_PROBES_MAX]);
 /** What can be read of the probes that have lit the room, but for rate_hz: its median is made of
  * the intervals, in ms, without the lock. Returns their number. */
 int gn_probes_get_figures(const struct gn_probes *probes,

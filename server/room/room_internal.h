@@ -38,6 +38,7 @@ struct gn_room_session {
     uint64_t last_frame_id, last_environment_sequence, last_emitter_sequence;
 
     bool was_clipped; // guarded by room->mu: a frame of it was, and the log says so
+    bool was_doubled; // guarded by room->mu: another probe was in its place, and the log says so
     bool was_told; // guarded by room->mu: it was sent the lighting states there were, or is about
                    // to be
     struct gn_session_figures figures; // guarded by room->mu

@@ -159,4 +159,25 @@ def test_clipped_rails_are_said_once():
         assert daemon.read_log().count('5 clipped pixels') == 1, daemon.read_log()
 
 
-run_tests([test_clipped_rails_are_said_once, test_blend_and_leave, test_bounded, test_fair])
+def test_one_place_is_told():
+    """Two in one place, as two without a position are: in the log once, in the status while it lasts."""
+    with Daemon(rooms=Room(scene=SCENE)) as daemon, Viewer(daemon) as viewer, \
+            probe(daemon) as one, probe(daemon) as other:
+        ids = [one.welcome.session_id, other.welcome.session_id]
+        light_at(one, 'red', .2)
+        look(viewer, 0, 1)
+        light_at(other, 'blue', .205)
+        for sequence, x, is_same in ((2, .205, True), (3, .195, True), (4, .3, False), (5, .2, True)):
+            light_at(other, 'blue', x, sequence)
+            look(viewer, 0, sequence)
+            told = {p['session']: p['same_place_as'] for p in read_room(daemon)['lit_by']}
+            assert told == {ids[0]: ids[1:] * is_same, ids[1]: ids[:1] * is_same}, (x, told)
+        light_at(one, 'red', .2, 2)  # the other's line was this one's, too
+        wait_for(daemon, lambda lit_by: 2 in [p['sequence'] for p in lit_by])
+        log = [line for line in daemon.read_log().splitlines() if 'the mean of both' in line]
+        assert len(log) == 1, log
+        assert ' WARN ' in log[0] and 'room demo: session %d (test) lights the room from the same place as session %d' % (
+            ids[1], ids[0]) in log[0] and '"position"' in log[0], log
+
+
+run_tests([test_one_place_is_told, test_clipped_rails_are_said_once, test_blend_and_leave, test_bounded, test_fair])

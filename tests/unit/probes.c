@@ -316,6 +316,37 @@ static void test_worked_frames(void **state)
     gn_probes_finish(&probes);
 }
 
+/* Within a centimetre of each other; not those without light, nor free slots. */
+static void test_same_place(void **state)
+{
+    (void)state;
+    static struct gn_probes probes;
+    static const double x[4] = {0, 0.0099, 0.0201, 0.5};
+    double *position[4];
+    uint64_t ids[GN_PROBES_MAX];
+    for (uint64_t id = 1; id <= 5; id++)
+        assert_int_equal(put(&probes, id, 1), 0);
+    for (uint64_t id = 1; id <= 4; id++) {
+        take(&probes, true);
+        set_light(&probes, id, true, 0);
+        position[id - 1] = probes.slots[id - 1].light->map->world_from_probe.translation;
+        position[id - 1][0] = x[id - 1];
+    }
+    assert_int_equal(gn_probes_find_same_place(&probes, 1, ids), 1);
+    assert_int_equal(ids[0], 2);
+    assert_int_equal(gn_probes_find_same_place(&probes, 2, ids), 1);
+    assert_int_equal(ids[0], 1);
+    assert_int_equal(gn_probes_find_same_place(&probes, 3, ids), 0);
+    position[3][0] = 0;
+    position[3][2] = -0.0099;
+    assert_int_equal(gn_probes_find_same_place(&probes, 1, ids), 2);
+    assert_true(ids[0] == 2 && ids[1] == 4);
+    assert_int_equal(gn_probes_find_same_place(&probes, 2, ids), 1); // 4 is 1.4 cm off
+    assert_int_equal(gn_probes_find_same_place(&probes, 5, ids), 0); // no light yet
+    assert_int_equal(gn_probes_find_same_place(&probes, 0, ids), 0);
+    gn_probes_finish(&probes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -326,6 +357,7 @@ int main(void)
         cmocka_unit_test(test_who_makes_room),
         cmocka_unit_test(test_who_is_newest),
         cmocka_unit_test(test_worked_frames),
+        cmocka_unit_test(test_same_place),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
