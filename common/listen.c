@@ -91,10 +91,11 @@ int gn_listen_loopback(const char *what, const struct gn_address *address, int b
     int fd = open_listener(at->ai_addr, at->ai_addrlen, backlog);
     freeaddrinfo(list);
     if (fd == -EADDRINUSE)
-        return gn_error_set(out_error, fd,
-                            "%s %s: in use: another program listens there, perhaps an older one of "
-                            "these: end it, or give another %s ADDRESS:PORT (port 0 picks one)",
-                            what, wanted, what);
+        return gn_error_set(
+            out_error, fd,
+            "%s %s: in use: another program listens there, perhaps an older gnomond: "
+            "end it, or give another %s ADDRESS:PORT (port 0 picks one)",
+            what, wanted, what);
     if (fd < 0)
         return gn_error_set(out_error, fd, "%s %s: %s", what, wanted, strerror(-fd));
     struct sockaddr_storage bound;
