@@ -3,6 +3,8 @@
 /*
  * gnomon doctor: says what on this machine works.
  */
+#include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -17,8 +19,19 @@
 #include "client/feature.h"
 #include "client/view/window.h"
 #include "client/vision/markers.h"
+#include "common/clock.h"
 #include "common/thread.h"
 #include "proto/attr.h"
+
+/** More probes than a room takes. */
+#define MAX_PROBES 64
+/** The server sends its figures once a second; light may take a while. */
+#define LISTEN_NS (GN_NS_PER_S / 2)
+#define LISTEN_MAX_NS (3 * GN_NS_PER_S)
+/** Light that is older is worth a look. */
+#define OLD_S 10.0
+/** As near as the server takes for one place, m. */
+#define SAME_PLACE_M 0.01
 
 static const struct gn_option option_table[] = {
     GN_CMD_SERVER_OPTIONS,
@@ -27,8 +40,10 @@ static const struct gn_option option_table[] = {
 static const struct gn_program program = {
     .name = "gnomon doctor",
     .usage = "[OPTION]...",
-    .summary = "Checks what a client needs: the server (reachable, version, clock), the cameras "
-               "this machine has, what this build can read. Exits 0 only when nothing failed.",
+    .summary =
+        "Checks what a client needs: the server (reachable, version, clock), the probes that "
+        "light its room, the cameras this machine has, what this build can read. Exits 0 "
+        "only when nothing failed.",
     .notes = "Example:\n  gnomon doctor --server 127.0.0.1:7340\n",
     .options = option_table,
     .n_options = GN_ARRAY_LEN(option_table),
@@ -39,6 +54,147 @@ static void say(const char *mark, const char *what, const char *text)
     printf("%-6s %-10s %s\n", mark, what, text);
 }
 
+/** Light of one probe, as the server told it last. */
+struct light {
+    uint64_t session;
+    int64_t capture_ns; // server's clock
+    uint32_t n_lights;
+    double position[3]; // m, world
+};
+
+/** What the server says of a room's probes and light. */
+struct lighting {
+    int n;
+    struct light lights[MAX_PROBES];
+    bool has_statistics;
+    struct gn_msg_statistics statistics;
+};
+
+static void take_light(struct lighting *l, const struct gn_msg_lighting_state *m)
+{
+    int i = 0;
+    while (i < l->n && l->lights[i].session != m->probe)
+        i++;
+    if (m->gone && i < l->n) {
+        l->lights[i] = l->lights[--l->n];
+    } else if (!m->gone && i < MAX_PROBES) {
+        l->lights[i] = (struct light){m->probe, m->capture_time_ns, m->light_count, {0}};
+        for (int k = 0; k < 3; k++)
+            l->lights[i].position[k] = (double)m->probe_position_m[k];
+        l->n += i == l->n;
+    }
+}
+
+/** Listens until the server's figures come, and a little: a frame that rests is worked on now that
+ * somebody asks for light. */
+static int listen_for_light(struct gn_client *client, struct lighting *l,
+                            struct gn_error *out_error)
+{
+    int64_t start_ns = gn_client_now_ns(), now_ns = start_ns;
+    while (now_ns - start_ns < (l->has_statistics ? LISTEN_NS : LISTEN_MAX_NS) &&
+           !gn_cmd_is_interrupted()) {
+        struct gn_client_event event;
+        int got = gn_client_poll(client, 100, &event);
+        if (got < 0)
+            return gn_cmd_set_fault(client, got, out_error);
+        if (got > 0 && event.type == GN_WIRE_LIGHTING_STATE) {
+            take_light(l, &event.message.lighting_state);
+        } else if (got > 0 && event.type == GN_WIRE_STATISTICS) {
+            l->statistics = event.message.statistics;
+            l->has_statistics = true;
+        } else if (got > 0) {
+            int err = gn_cmd_take_event(&event, out_error);
+            if (err)
+                return err;
+        }
+        now_ns = gn_client_now_ns();
+    }
+    return 0;
+}
+
+static void print_age(double s, char *text, size_t size)
+{
+    if (s < 10)
+        snprintf(text, size, "%.1f s", s);
+    else if (s < 120)
+        snprintf(text, size, "%.0f s", s);
+    else if (s < 7200)
+        snprintf(text, size, "%.0f min", s / 60);
+    else
+        snprintf(text, size, "%.0f h", s / 3600);
+}
+
+static const struct light *find_same_place(const struct lighting *l, int i)
+{
+    const double *a = l->lights[i].position;
+    for (int k = 0; k < i; k++) {
+        const double *b = l->lights[k].position;
+        if (hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]) < SAME_PLACE_M)
+            return &l->lights[k];
+    }
+    return NULL;
+}
+
+/** What is missing where no probe has given light. */
+static void say_no_light(const struct lighting *l)
+{
+    const struct gn_msg_statistics *s = &l->statistics;
+    int64_t n_probes = s->has_probes ? (int64_t)s->probes - 1 : 0; // this program is one
+    char text[256];
+    if (!l->has_statistics)
+        snprintf(text, sizeof(text), "nothing was heard of light in %d s",
+                 (int)(LISTEN_MAX_NS / GN_NS_PER_S));
+    else if (s->environment_frames_in > 0)
+        snprintf(text, sizeof(text),
+                 "no light since the room was opened: of %" PRIu64 " environment frames none gave "
+                 "any; gnomon probe says why",
+                 s->environment_frames_in);
+    else if (n_probes > 0)
+        snprintf(text, sizeof(text),
+                 "no light since the room was opened: %" PRId64
+                 " connected, and none has sent a frame",
+                 n_probes);
+    else
+        snprintf(text, sizeof(text), "no light since the room was opened: %s; start gnomon probe",
+                 s->has_probes ? "no probe is connected" : "no environment frame has come");
+    say("none", "probes", text);
+}
+
+/** The probes that light the room: how old their light is, and what is odd about it. */
+static bool check_probes(struct gn_client *client)
+{
+    struct lighting l = {0};
+    struct gn_error error = {0};
+    char text[512], age[32];
+    if (listen_for_light(client, &l, &error) < 0) {
+        say("FAILED", "probes", error.text);
+        return false;
+    }
+    if (l.n == 0)
+        say_no_light(&l);
+    int64_t now_ns = gn_client_to_server_ns(client, gn_client_now_ns());
+    for (int i = 0; i < l.n; i++) {
+        const struct light *p = &l.lights[i], *twin = find_same_place(&l, i);
+        double age_s = ((double)now_ns - (double)p->capture_ns) * 1e-9;
+        print_age(fmax(age_s, 0), age, sizeof(age));
+        int n = snprintf(
+            text, sizeof(text), "session %" PRIu64 ": %u lights, %s old, at %.2f, %.2f, %.2f m",
+            p->session, p->n_lights, age, p->position[0], p->position[1], p->position[2]);
+        if (twin)
+            snprintf(text + n, sizeof(text) - (size_t)n,
+                     ", where session %" PRIu64 " is: the mean of both is taken", twin->session);
+        else if (age_s > OLD_S)
+            snprintf(text + n, sizeof(text) - (size_t)n, "; nothing newer has come");
+        say(age_s > OLD_S ? "old" : "ok", i ? "" : "probes", text);
+    }
+    int64_t n_dark = l.statistics.has_probes ? (int64_t)l.statistics.probes - 1 - l.n : 0;
+    if (l.n > 0 && n_dark > 0) {
+        snprintf(text, sizeof(text), "%" PRId64 " more connected, without light so far", n_dark);
+        say("none", "", text);
+    }
+    return true;
+}
+
 /** Connects, greets, measures the clock. Returns whether it worked. */
 static bool check_server(const struct gn_options *options)
 {
@@ -47,7 +203,12 @@ static bool check_server(const struct gn_options *options)
     struct gn_client *client = NULL;
     struct gn_error error = {0};
     // A probe that sends nothing: it takes no viewer's place.
-    if (gn_cmd_connect(&program, options, GN_MSG_ROLE_PROBE, &client, &error) < 0) {
+    const struct gn_cmd_link link = {.program = &program,
+                                     .options = options,
+                                     .role = GN_MSG_ROLE_PROBE,
+                                     .wants_light = true,
+                                     .wants_statistics = true};
+    if (gn_cmd_connect_as(&link, &client, &error) < 0) {
         say("FAILED", "server", error.text);
         return false;
     }
@@ -69,8 +230,9 @@ static bool check_server(const struct gn_options *options)
     else
         snprintf(text, sizeof(text), "not measured yet: no frame has been rendered in this room");
     say("ok", "rate", text);
+    bool is_ok = check_probes(client);
     gn_cmd_disconnect(&client);
-    return true;
+    return is_ok;
 }
 
 static void check_libraries(void)

@@ -58,6 +58,8 @@ void gn_room_get_statistics(struct gn_room *room, struct gn_msg_statistics *out_
     memset(out_statistics, 0, sizeof(*out_statistics));
     gn_wire_set_string(out_statistics->room, sizeof(out_statistics->room), room->name);
     out_statistics->sessions = (uint32_t)(f.n_viewers + f.n_probes + f.n_screens + f.n_trackers);
+    out_statistics->has_probes = true;
+    out_statistics->probes = (uint32_t)f.n_probes;
     out_statistics->frames_in = f.frames_in;
     out_statistics->frames_out = f.frames_out;
     out_statistics->frames_dropped = f.frames_dropped;

@@ -14,7 +14,7 @@ import time
 
 sys.path.insert(0, sys.argv[2])
 from folder import Folder  # noqa: E402
-from gnomond import Daemon, run_tests  # noqa: E402
+from gnomond import Daemon, light_up, pb, probe as daemon_probe, run_tests  # noqa: E402
 from pictures import exr_bytes, png_bytes, read_png  # noqa: E402
 from run import Run, server  # noqa: E402
 
@@ -388,10 +388,37 @@ def test_sequence():
         assert read_report(bench)['results'] == 3
 
 
+def test_doctor_tells_of_light():
+    """What is missing while there is no light, then whose it is, how old, and where."""
+    def ask(wanted, mark):
+        out = Run('doctor', server(daemon)).succeed()
+        rows = re.findall(r'^(\w*) +probes +(.*)\n((?:\w* {9,}.*\n)*)', out, re.M)
+        assert len(rows) == 1 and rows[0][0] == mark and re.search(wanted, rows[0][1]), (wanted, out)
+        return rows[0][2]
+
+    with Daemon() as daemon, Bench() as bench:
+        with daemon_probe(daemon) as dark:
+            ask('1 connected, and none has sent a frame', 'none')
+            light_up(dark, pixels=b'\xff\xd8 and no more', pixel_format=pb.PIXEL_FORMAT_JPEG)
+            ask('of 1 environment frames none gave any', 'none')
+            light_up(dark, 2, capture_time_ns=time.monotonic_ns() - 100 * 10**9)
+            with daemon_probe(daemon):
+                lamp = probe(daemon, bench, '--loop', '--rate', '5')
+                lamp.wait_for('environment frame 2')
+                rest = ask(r'session %d: \d+ lights, 1\d\d s old, at 0\.00, 0\.00, 0\.00 m; nothing newer' %
+                           dark.welcome.session_id, 'old')
+                assert re.search(r'^ok +session \d+: \d+ lights, 0\.\d s old.*, where session %d is: the mean '
+                                 'of both' % dark.welcome.session_id, rest), rest
+                assert re.search(r'^none +1 more connected, without light so far$', rest, re.M), rest
+                lamp.process.terminate()
+                lamp.end()
+
+
 def test_doctor():
     with Daemon() as daemon:
         out = Run('doctor', server(daemon)).succeed()
         assert 'FAILED' not in out
+        assert re.search('^none +probes +no light since the room was opened: no probe is connected', out, re.M), out
         for word in ("room 'demo'", 'protocol 1', 'round trip', '1920x1200', 'OpenEXR', 'gige',
                      'v4l2', 'video', 'vision', 'window'):
             assert word in out, out
@@ -411,4 +438,4 @@ run_tests([test_frames, test_nothing_virtual_is_told, test_outstanding, test_pro
            test_daemon_stopped, test_daemon_slow, test_jpeg, test_sync_light, test_several_views,
            test_no_light, test_late_start, test_interrupt, test_probe_files,
            test_probe_table_and_mask, test_view_files,
-           test_sequence, test_doctor])
+           test_sequence, test_doctor_tells_of_light, test_doctor])
