@@ -317,6 +317,7 @@ static int start_stream(struct gn_gige_device *d, const struct gn_gige_place *pl
         return gn_error_set(
             out_error, -EINVAL, "camera %s: %zu bytes a picture announced, but %dx%d %s has %zu",
             place->id, payload, d->width, d->height, d->format->name, d->picture_bytes);
+    d->payload_bytes = payload;
     d->receiver = calloc(1, sizeof(*d->receiver));
     if (!d->receiver)
         return gn_error_set(out_error, -ENOMEM, "out of memory");

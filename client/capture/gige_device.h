@@ -29,6 +29,7 @@ struct gn_gige_device {
     const struct gn_pixels_format *format;
     int width, height;
     size_t picture_bytes; // of one picture as the camera sends it
+    size_t payload_bytes; // of a buffer: the picture and what follows it
     double frame_rate_hz; // 0: it does not say
     double exposure_us;   // 0: it does not say
     bool is_triggered;    // pictures come when a trigger does, or never

@@ -60,7 +60,9 @@ static bool is_whole(const struct gn_gige *s, ArvBuffer *buffer)
         return false;
     size_t size = 0;
     const void *data = arv_buffer_get_image_data(buffer, &size);
-    return data && size >= s->picture_bytes &&
+    // Aravis adds up what packets say that they hold, also beyond the buffer, and would look for
+    // chunks there.
+    return data && size >= s->picture_bytes && size <= s->device.payload_bytes &&
            arv_buffer_get_image_pixel_format(buffer) == s->format->code &&
            arv_buffer_get_image_width(buffer) == s->width &&
            arv_buffer_get_image_height(buffer) == s->height;

@@ -127,12 +127,16 @@ static void lose(struct v4l2_source *s, const char *why)
     s->retry_ns = now_ns(s); // at once: it may only have changed
 }
 
-/** The middle of the exposure, where its length was set: drivers stamp its beginning or its end. */
-static int64_t move_to_middle(const struct v4l2_source *s, const struct v4l2_buffer *b, int64_t t)
+/** The middle of the exposure, where its length was set: drivers stamp its beginning or its end.
+ * The stamp itself where that would be later than now, or before the picture before: an exposure
+ * that was just set holds from a later picture on. */
+static int64_t move_to_middle(const struct v4l2_source *s, const struct v4l2_buffer *b, int64_t t,
+                              int64_t now)
 {
     int64_t half_ns = (int64_t)(s->options.exposure_us * 500);
     bool is_start = (b->flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
-    return is_start ? t + half_ns : t - half_ns;
+    int64_t middle = is_start ? t + half_ns : t - half_ns;
+    return middle >= s->given_ns && middle <= now ? middle : t;
 }
 
 /** When the picture was taken: the driver's time where it is one of CLOCK_MONOTONIC, neither before
@@ -144,7 +148,7 @@ static int64_t get_time_ns(struct v4l2_source *s, const struct v4l2_buffer *b)
         (b->flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
     if (is_monotonic && sec >= 0 && sec < INT64_MAX / GN_NS_PER_S && usec >= 0 && usec < 1000000) {
         int64_t t = sec * GN_NS_PER_S + usec * GN_NS_PER_US;
-        int64_t middle = move_to_middle(s, b, t < now ? t : now);
+        int64_t middle = move_to_middle(s, b, t < now ? t : now, now);
         if (t >= now - MAX_AGE_NS && t <= now + MAX_AHEAD_NS && middle >= s->given_ns)
             return middle;
     }

@@ -136,11 +136,11 @@ static int set_exposure(const struct gn_v4l2_device *d, double exposure_us,
     double units = exposure_us / EXPOSURE_UNIT_US;
     if (!(units >= q.minimum - 0.5 && units <= q.maximum + 0.5))
         return gn_error_set(out_error, -EINVAL,
-                            "%s (%s): exposure %g us is not in [%d, %d] us, which it takes in "
+                            "%s (%s): exposure %g us is not in [%g, %g] us, which it takes in "
                             "steps of %d us",
-                            d->path, d->card, exposure_us, q.minimum * EXPOSURE_UNIT_US,
-                            q.maximum * EXPOSURE_UNIT_US, EXPOSURE_UNIT_US);
-    return set_value(d, &q, round(units), out_error);
+                            d->path, d->card, exposure_us, 1.0 * EXPOSURE_UNIT_US * q.minimum,
+                            1.0 * EXPOSURE_UNIT_US * q.maximum, EXPOSURE_UNIT_US);
+    return set_value(d, &q, fmin(fmax(round(units), q.minimum), q.maximum), out_error);
 }
 
 static int set_gain(const struct gn_v4l2_device *d, double gain, struct gn_error *out_error)
@@ -292,7 +292,8 @@ int gn_v4l2_exposure_set(const struct gn_v4l2_device *device,
         return gn_error_set(
             out_error, -ERANGE, "%s (%s): exposure %g%s is not in [%g, %g]%s, which it takes",
             device->path, device->card, value, unit, scale * q.minimum, scale * q.maximum, unit);
-    struct v4l2_control c = {.id = q.id, .value = (int32_t)lround(value / scale)};
+    double nearest = fmin(fmax(round(value / scale), q.minimum), q.maximum);
+    struct v4l2_control c = {.id = q.id, .value = (int32_t)nearest};
     err = gn_v4l2_device_call(device, VIDIOC_S_CTRL, &c);
     if (err)
         return gn_error_set(out_error, err, "%s (%s): exposure %g%s cannot be set: %s",

@@ -125,6 +125,15 @@ static void count_gap(struct gn_v4l2_stream *s, uint32_t sequence)
     s->has_sequence = true;
 }
 
+/** Whether a JPEG was cut off: all end with FF D9, which is nowhere in the compressed data (ITU-T
+ * T.81, B.1.1.2 and F.1.2.3). Drivers leave anything behind it. */
+static bool is_cut(const uint8_t *data, size_t n)
+{
+    while (n >= 2 && !(data[n - 2] == 0xff && data[n - 1] == 0xd9))
+        n--;
+    return n < 2;
+}
+
 /** Whether a filled buffer holds a whole picture; what cables do is no fault of the driver. */
 static bool is_whole(struct gn_v4l2_stream *s, const struct v4l2_buffer *b)
 {
@@ -141,6 +150,8 @@ static bool is_whole(struct gn_v4l2_stream *s, const struct v4l2_buffer *b)
                              NULL) < 0 ||
             width != s->layout->width || height != s->layout->height)
             s->fault = "holds no JPEG of the size that was set";
+        else if (is_cut(buffer->start, b->bytesused))
+            s->fault = "holds a JPEG without its end";
         else
             return true;
     } else if (!gn_v4l2_has_sound_codes(s->layout, buffer->start))

@@ -170,6 +170,35 @@ static void test_times_are_the_middle_of_the_exposure(void **state)
     gn_fake_finish(&fake);
 }
 
+/* What was just set holds from a later picture on: these are not half of it off, nor told of. */
+static void test_times_of_an_exposure_to_come(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    struct gn_exposure range;
+    double took = 0;
+    gn_fake_init(&fake);
+    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){.exposure_us = 8000});
+    assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, NULL), 0);
+    gn_fake_fill(&fake, 0, 128);
+    assert_int_equal(read_picture(source).time_ns, fake.now_ns - 4 * GN_NS_PER_MS);
+    assert_int_equal(gn_source_set_exposure(source, 200e3, &took, NULL), 0);
+    fake.now_ns += 40 * GN_NS_PER_MS;
+    gn_fake_fill(&fake, 1, 128); // its end is stamped; 100 ms earlier is before the picture before
+    assert_int_equal(read_picture(source).time_ns, fake.now_ns);
+    fake.now_ns += 40 * GN_NS_PER_MS;
+    gn_fake_fill(&fake, 2, 128)->flags |= V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+    int64_t begin_ns = fake.now_ns;
+    fake.now_ns += 20 * GN_NS_PER_MS; // 80 ms from now would be its middle
+    assert_int_equal(read_picture(source).time_ns, begin_ns);
+    fake.now_ns += 240 * GN_NS_PER_MS;
+    gn_fake_fill(&fake, 3, 128);
+    assert_int_equal(read_picture(source).time_ns, fake.now_ns - 100 * GN_NS_PER_MS);
+    expect_news(source, "");
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 /* Some drivers compute their times, which run ahead a little. */
 static void test_times_are_never_ahead(void **state)
 {
@@ -605,6 +634,33 @@ static void test_mjpeg_passes_as_jpeg(void **state)
     gn_fake_finish(&fake);
 }
 
+/* By a cable, for example; what is left in the buffer behind a whole one is no matter. */
+static void test_mjpeg_that_is_cut_is_incomplete(void **state)
+{
+    (void)state;
+    static const uint32_t formats[] = {V4L2_PIX_FMT_MJPEG, 0};
+    static uint8_t file[640 * 480 * 8];
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    fake.formats = formats;
+    struct gn_source *source = open_camera(&fake, NULL);
+    size_t n = make_jpeg(640, 480, file, sizeof(file));
+    uint64_t n_cut = 0;
+    for (size_t cut = 1; cut < n / 2; cut = 2 * cut + 1, n_cut++) {
+        struct v4l2_buffer *b = gn_fake_fill(&fake, 0, 0);
+        memcpy(fake.memory[b->index], file, n - cut);
+        b->bytesused = (uint32_t)(n - cut);
+        expect_news(source, cut == 1 ? "holds a JPEG without its end" : "");
+    }
+    assert_true(n_cut > 5 && get_counts(source).n_incomplete == n_cut);
+    struct v4l2_buffer *b = gn_fake_fill(&fake, 0, 0x77);
+    memcpy(fake.memory[b->index], file, n);
+    b->bytesused = (uint32_t)n + 999;
+    assert_int_equal(read_picture(source).data_bytes, n + 999);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 static int get_value(struct gn_fake *fake, uint32_t id)
 {
     return gn_fake_get_control(fake, id)->value;
@@ -701,6 +757,7 @@ int main(void)
         cmocka_unit_test(test_newest_wins_and_gaps_are_counted),
         cmocka_unit_test(test_bad_buffers_are_counted_and_not_given),
         cmocka_unit_test(test_times_are_the_middle_of_the_exposure),
+        cmocka_unit_test(test_times_of_an_exposure_to_come),
         cmocka_unit_test(test_times_are_never_ahead),
         cmocka_unit_test(test_times_never_go_back),
         cmocka_unit_test(test_times_that_are_none),
@@ -715,6 +772,7 @@ int main(void)
         cmocka_unit_test(test_nothing_is_copied_that_need_not_be),
         cmocka_unit_test(test_what_cannot_be_lent_is_copied),
         cmocka_unit_test(test_mjpeg_passes_as_jpeg),
+        cmocka_unit_test(test_mjpeg_that_is_cut_is_incomplete),
         cmocka_unit_test(test_exposure_is_held_and_put_back),
         cmocka_unit_test(test_exposure_by_counts_or_not_at_all),
     };

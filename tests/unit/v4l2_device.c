@@ -193,6 +193,27 @@ static void test_controls_that_are_refused(void **state)
     }
 }
 
+/* Counts of 100 us up to what a number holds, and a time half a step above the last. */
+static void test_exposures_at_the_end_of_all_numbers(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    struct gn_error error = {0};
+    gn_fake_init(&fake);
+    struct gn_fake_control *c = gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_ABSOLUTE);
+    const struct gn_live_options last = {.exposure_us = 204749};
+    assert_int_equal(set_controls(&fake, &last, &error), 0);
+    assert_int_equal(c->value, 2047);
+    const struct gn_live_options more = {.exposure_us = 204750};
+    assert_int_equal(set_controls(&fake, &more, &error), 0);
+    assert_int_equal(c->value, 2047);
+    c->query.maximum = INT32_MAX;
+    const struct gn_live_options least = {.exposure_us = 1};
+    assert_int_equal(set_controls(&fake, &least, &error), -EINVAL);
+    assert_non_null(strstr(error.text, "is not in [300, 2.14748e+11] us"));
+    gn_fake_finish(&fake);
+}
+
 static void test_controls_that_do_not_take(void **state)
 {
     (void)state;
@@ -253,6 +274,7 @@ int main(void)
         cmocka_unit_test(test_refusals_name_what_there_is),
         cmocka_unit_test(test_controls),
         cmocka_unit_test(test_controls_that_are_refused),
+        cmocka_unit_test(test_exposures_at_the_end_of_all_numbers),
         cmocka_unit_test(test_controls_that_do_not_take),
         cmocka_unit_test(test_description),
     };
