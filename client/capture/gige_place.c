@@ -91,7 +91,8 @@ int gn_gige_place_find(const char *id, struct gn_gige_place *out_place, struct g
             return check_reachable(out_place, out_error);
         }
         size_t length = strlen(found);
-        snprintf(found + length, sizeof(found) - length, "%s%s", i ? ", " : "", device_id);
+        snprintf(found + length, sizeof(found) - length, "%s%s", i ? ", " : "",
+                 device_id ? device_id : "?");
     }
     if (n == 0)
         return gn_error_set(out_error, -ENODEV,

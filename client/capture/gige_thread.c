@@ -113,14 +113,17 @@ static void tell_fault(struct gn_gige *s, ArvBuffer *buffer)
     char text[256];
     if (s->has_told_fault)
         return;
-    if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS)
+    if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) {
+        size_t n_bytes = 0;
+        (void)arv_buffer_get_data(buffer, &n_bytes);
         snprintf(
             text, sizeof(text),
-            "its pictures are no longer %dx%d %s, as was set, but %dx%d of format 0x%08x; such "
-            "are counted as incomplete and not used",
-            s->width, s->height, s->format->name, arv_buffer_get_image_width(buffer),
-            arv_buffer_get_image_height(buffer), arv_buffer_get_image_pixel_format(buffer));
-    else if (s->n_bad >= MANY_BAD && gn_clock_get_monotonic_ns() - s->whole_ns > FIRST_PICTURE_NS)
+            "its pictures are no longer %dx%d %s in %zu bytes, as was set, but %dx%d of format "
+            "0x%08x in %zu; such are counted as incomplete and not used",
+            s->width, s->height, s->format->name, s->device.payload_bytes,
+            arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer),
+            arv_buffer_get_image_pixel_format(buffer), n_bytes);
+    } else if (s->n_bad >= MANY_BAD && gn_clock_get_monotonic_ns() - s->whole_ns > FIRST_PICTURE_NS)
         snprintf(text, sizeof(text),
                  "none of the last %d pictures is whole: packets get lost (docs/capture.md, "
                  "\"Losses\", says what helps)",

@@ -388,7 +388,7 @@ def count_lies(daemon, folder, fault, seconds):
 def test_hostile():
     """Cameras that lie: no picture of theirs is given out; the daemon sees nothing of it."""
     with Daemon() as daemon, Given() as folder:
-        for fault in ('size', 'format', 'truncated', 'change'):
+        for fault in ('size', 'format', 'truncated', 'overlong', 'change'):
             with Camera(*size(), '--fault', fault):
                 n_before_lies = 0
                 for seconds in (0.7, 5, 20):  # the machine may be busy

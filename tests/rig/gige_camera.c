@@ -147,6 +147,12 @@ static void send_packet(struct camera *c, const struct frame *f, uint32_t packet
         put32(bytes + 4, 3u << 24 | packet);
         memcpy(bytes + 8, f->data + at, length);
         n = 8 + length;
+        if (c->fault == FAULT_OVERLONG &&
+            packet == n_blocks) { // of a part, at 0; whole it is small
+            put32(bytes + 4, 7u << 24 | packet);
+            memset(bytes + 8, 0, 8 + f->chunk);
+            n = 8 + f->chunk;
+        }
     } else if (packet == n_blocks + 1) {
         put32(bytes + 4, 2u << 24 | packet);
         put32(bytes + 8, 1);

@@ -20,7 +20,8 @@ enum fault {
     FAULT_CHANGE,
     FAULT_SILENT,
     FAULT_DIM,
-    FAULT_EXPOSURE
+    FAULT_EXPOSURE,
+    FAULT_OVERLONG
 };
 
 /** The program and its options. */

@@ -88,12 +88,13 @@ static const struct gn_option option_table[] = {
     {.key = "fault",
      .flag = "fault",
      .type = GN_OPTION_ENUM,
-     .choices = "none|size|format|truncated|codes|huge|drop|change|silent|dim|exposure",
+     .choices = "none|size|format|truncated|codes|huge|drop|change|silent|dim|exposure|overlong",
      .default_value = "none",
      .help = "Lie: pictures of another size or format than agreed, their end missing, codes above "
              "the format's, or an absurd size. drop: each fifth picture never leaves; change: "
              "another size from the 20th on; silent: no picture ever leaves; dim: from the 20th on "
-             "each is exposed for 0.6 s; exposure: every other is said to be exposed for 10 s."},
+             "each is exposed for 0.6 s; exposure: every other is said to be exposed for 10 s; "
+             "overlong: packets hold more than a picture."},
     {.key = "trigger-ms",
      .flag = "trigger-ms",
      .type = GN_OPTION_DOUBLE,
