@@ -57,6 +57,9 @@ static void test_degenerate_views(void **unused)
             see(v, 0.5 * sin(v), 0.5 * cos(v), 0.08 * sin(3.0 * v), 0.06 * cos(2.0 * v), 0.3);
     expect(views, 8, NULL);
     expect(views, 4, "4 pictures show the board, at least 5");
+    for (int v = 0; v < 8; v++) // tilted in one of them only
+        views[v] = see(v, v == 3 ? 0.5 : 0.01, 0, 0.08 * sin(3.0 * v), 0.06 * cos(2.0 * v), 0.3);
+    expect(views, 8, "in 7 of 8 pictures the board is parallel to the picture");
     for (int v = 0; v < 8; v++)
         views[v] = see(v, 0.01, 0, 0.08 * sin(3.0 * v), 0.06 * cos(2.0 * v), 0.3);
     expect(views, 8, "in 8 of 8 pictures the board is parallel to the picture");
@@ -101,6 +104,10 @@ static void test_judgement(void **unused)
     in.deviation[1] = 60;
     assert_int_equal(gn_views_judge(&in, 640, 1, &e), -EDOM);
     assert_non_null(strstr(e.text, "focal length uncertain by 10.0 %"));
+    in.deviation[1] = 1;
+    in.deviation[3] = 13;
+    assert_int_equal(gn_views_judge(&in, 640, 2, &e), -EDOM);
+    assert_non_null(strstr(e.text, "by 0.2 % and the centre by 2.0 % of the picture"));
 }
 
 /* Intrinsics, then a response: both are in the file, which is a camera; nonsense leaves it alone.
@@ -130,6 +137,14 @@ static void test_device_files(void **unused)
     assert_true(camera.fx == 601.5 && camera.cy == 239.5);
     assert_int_equal(camera.response.type, GN_RESPONSE_LOG);
     assert_true(camera.response.log_b == 0.07 && camera.response.log_c == 2e-4);
+    // What is null goes; what is not named stays.
+    assert_int_equal(gn_device_file_update(path, json_pack("{s:n, s:f}", "scale", "cx", 321.0), &e),
+                     0);
+    assert_int_equal(gn_device_file_update(path, json_pack("{s:f}", "scale", 0.5), &e), 0);
+    assert_int_equal(gn_device_file_update(path, json_pack("{s:n}", "scale"), &e), 0);
+    assert_int_equal(gn_camera_read_file(path, &camera, &e), 0);
+    assert_true(camera.cx == 321 && camera.cy == 239.5);
+    assert_true(camera.response.scale != 0.5);
     curve.b = -1; // no response
     assert_true(gn_device_file_update(
                     path, json_pack("{s:o}", "response", gn_device_file_make_curve(&curve)), &e) <

@@ -252,6 +252,7 @@ static void test_refusals(void **unused)
 {
     (void)unused;
     struct sensor dark = {.a = 0.6, .b = 0.07, .c = 1e-30, .full = 4095};
+    struct sensor rough = {.a = 0.6, .b = 0.07, .c = 2e-4, .noise = 400, .full = 4095};
     struct sensor flat = {.is_linear = true, .a = 0.2, .b = 0.05, .noise = 1, .full = 4095};
     const struct {
         const struct sensor *sensor;
@@ -263,6 +264,7 @@ static void test_refusals(void **unused)
         {&hdrc, {1}, 1, true, "one exposure alone"},
         {&hdrc, {1, 1, 1, 1}, 4, true, "one exposure alone"},
         {&hdrc, {1, 1.002, 1.001, 1.003}, 4, true, "condition number"},
+        {&rough, {1, 1.1, 1.2, 1.3}, 4, true, "gain of the log curve is uncertain by"},
         {&dark, {1e-12, 2e-12, 4e-12, 8e-12}, 4, true, "unclipped"},
         {&hdrc, {1e6, 2e6, 4e6, 8e6}, 4, true, "unclipped"},
         {&flat, {1, 2, 4, 8}, 4, true, "linear sensor"},

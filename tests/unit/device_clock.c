@@ -52,6 +52,12 @@ static void test_nonsense(void **state)
     assert_true(gn_device_clock_map(&clock, 1, later_ns + 2) == later_ns + 2);
     assert_true(gn_device_clock_map(&clock, 9 * GN_NS_PER_S, later_ns + 3) == later_ns + 3);
     assert_true(gn_device_clock_map(&clock, 9 * GN_NS_PER_S + 5, later_ns + 9) == later_ns + 8);
+    // Its clock stood still for two seconds: the arrival too.
+    later_ns += 2 * GN_NS_PER_S;
+    assert_true(gn_device_clock_map(&clock, 9 * GN_NS_PER_S + 9, later_ns) == later_ns);
+    // Arrivals that do not go on, as where the wall clock is set: time does.
+    assert_true(gn_device_clock_map(&clock, 0, later_ns) == later_ns + 1);
+    assert_true(gn_device_clock_map(&clock, 0, later_ns - GN_NS_PER_MS) == later_ns + 2);
     later_ns += 10;
     for (uint64_t device_ns = 1; device_ns; device_ns = device_ns * 3) { // wraps in the end
         int64_t got_ns = gn_device_clock_map(&clock, device_ns, ++later_ns);

@@ -190,7 +190,16 @@ static void test_lens(void **unused)
     n = see(&truth, &pose, 48, 0.2, 0.1, s);
     assert_int_equal(gn_fisheye_fit(&guess, GN_FISHEYE_LENS | GN_FISHEYE_RADIUS, s, n, &fit, &e),
                      -EDOM);
-    assert_non_null(strstr(e.text, "do not determine"));
+    assert_non_null(strstr(e.text, "do not determine the lens"));
+    // A ring of lamps: all that is known is one angle's distance from the centre.
+    for (int i = 0; i < 16; i++) {
+        const double dir[3] = {sin(1) * cos(i), sin(1) * sin(i), cos(1)};
+        assert_true(gn_projection_get_position(&truth, dir, s[i].xy));
+        gn_pose_rotate(&pose, dir, s[i].dir_world);
+    }
+    assert_int_equal(gn_fisheye_fit(&truth, GN_FISHEYE_LENS, s, 16, &fit, &e), -EDOM);
+    assert_non_null(strstr(e.text, "condition number"));
+    assert_int_equal(gn_fisheye_fit(&truth, GN_FISHEYE_RADIUS, s, 16, &fit, &e), 0);
 }
 
 static void test_refusals(void **unused)
