@@ -375,6 +375,18 @@ static void test_what_comes_back_is_not_the_camera(void **state)
     gn_fake_finish(&fake);
 }
 
+/** How long it is waited for a picture until the camera counts as lost. */
+static int64_t wait_until_lost(struct gn_fake *fake, struct gn_source *source)
+{
+    int64_t last_ns = fake->now_ns;
+    struct gn_capture capture;
+    struct gn_error error = {0};
+    while (!error.text[0] && fake->now_ns < last_ns + 20 * GN_NS_PER_S)
+        assert_int_equal(gn_source_read(source, &capture, &error), -EAGAIN);
+    assert_non_null(strstr(error.text, "no picture comes any more"));
+    return fake->now_ns - last_ns;
+}
+
 static void test_a_camera_that_stalls_is_opened_again(void **state)
 {
     (void)state;
@@ -383,13 +395,7 @@ static void test_a_camera_that_stalls_is_opened_again(void **state)
     struct gn_source *source = open_camera(&fake, NULL);
     gn_fake_fill(&fake, 0, 128);
     read_picture(source);
-    int64_t last_ns = fake.now_ns;
-    struct gn_capture capture;
-    struct gn_error error = {0};
-    while (!error.text[0] && fake.now_ns < last_ns + 20 * GN_NS_PER_S)
-        assert_int_equal(gn_source_read(source, &capture, &error), -EAGAIN);
-    assert_non_null(strstr(error.text, "no picture comes any more"));
-    assert_in_range(fake.now_ns - last_ns, GN_NS_PER_S, GN_NS_PER_S + 100 * GN_NS_PER_MS);
+    assert_in_range(wait_until_lost(&fake, source), GN_NS_PER_S, GN_NS_PER_S + 100 * GN_NS_PER_MS);
     expect_news(source, "is back");
     assert_int_equal(fake.n_opened, 2);
     gn_fake_fill(&fake, 0, 128);
@@ -398,6 +404,24 @@ static void test_a_camera_that_stalls_is_opened_again(void **state)
     expect_news(source, "its pictures have changed");
     expect_news(source, "is back");
     assert_int_equal(get_counts(source).n_reopened, 2);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
+static void test_first_pictures_and_long_exposures_have_time(void **state)
+{
+    (void)state;
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    gn_fake_get_control(&fake, V4L2_CID_EXPOSURE_ABSOLUTE)->query.maximum = 10000; // 1 s
+    struct gn_source *source = open_camera(&fake, &(struct gn_live_options){.exposure_us = 600000});
+    int64_t waited_ns = wait_until_lost(&fake, source);
+    assert_in_range(waited_ns, 5 * GN_NS_PER_S, 5 * GN_NS_PER_S + 100 * GN_NS_PER_MS);
+    expect_news(source, "is back");
+    gn_fake_fill(&fake, 0, 128);
+    read_picture(source);
+    waited_ns = wait_until_lost(&fake, source); // five times 0.6 s
+    assert_in_range(waited_ns, 3 * GN_NS_PER_S, 3 * GN_NS_PER_S + 100 * GN_NS_PER_MS);
     gn_source_close(&source);
     gn_fake_finish(&fake);
 }
@@ -661,6 +685,30 @@ static void test_mjpeg_that_is_cut_is_incomplete(void **state)
     gn_fake_finish(&fake);
 }
 
+/* A JPEG may be as long as its buffer; where none is lent that is the room it is copied into. */
+static void test_jpegs_of_any_length_are_copied(void **state)
+{
+    (void)state;
+    static const uint32_t formats[] = {V4L2_PIX_FMT_MJPEG, 0};
+    static uint8_t file[640 * 480 * 8];
+    struct gn_fake fake;
+    gn_fake_init(&fake);
+    fake.formats = formats;
+    fake.n_given = 2;
+    struct gn_source *source = open_camera(&fake, NULL);
+    struct v4l2_buffer *b = gn_fake_fill(&fake, 0, 0xff); // what is behind a JPEG is no one's
+    uint8_t *data = fake.memory[b->index];
+    memcpy(data, file, make_jpeg(640, 480, file, sizeof(file)));
+    b->bytesused = fake.pix.sizeimage;
+    struct gn_capture c = read_picture(source);
+    assert_int_equal(c.data_bytes, fake.pix.sizeimage);
+    assert_ptr_not_equal(c.data, data);
+    assert_memory_equal(c.data, data, c.data_bytes);
+    assert_int_equal(get_counts(source).copied_bytes, c.data_bytes);
+    gn_source_close(&source);
+    gn_fake_finish(&fake);
+}
+
 static int get_value(struct gn_fake *fake, uint32_t id)
 {
     return gn_fake_get_control(fake, id)->value;
@@ -765,6 +813,7 @@ int main(void)
         cmocka_unit_test(test_what_comes_back_gives_the_same_pictures),
         cmocka_unit_test(test_what_comes_back_is_not_the_camera),
         cmocka_unit_test(test_a_camera_that_stalls_is_opened_again),
+        cmocka_unit_test(test_first_pictures_and_long_exposures_have_time),
         cmocka_unit_test(test_time_not_looked_at_is_no_silence),
         cmocka_unit_test(test_drivers_that_lie_at_the_start),
         cmocka_unit_test(test_drivers_that_lie_about_buffers),
@@ -773,6 +822,7 @@ int main(void)
         cmocka_unit_test(test_what_cannot_be_lent_is_copied),
         cmocka_unit_test(test_mjpeg_passes_as_jpeg),
         cmocka_unit_test(test_mjpeg_that_is_cut_is_incomplete),
+        cmocka_unit_test(test_jpegs_of_any_length_are_copied),
         cmocka_unit_test(test_exposure_is_held_and_put_back),
         cmocka_unit_test(test_exposure_by_counts_or_not_at_all),
     };
