@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <new>
 #include <vector>
 
@@ -201,6 +202,13 @@ int gn_marker_get_cells(int dictionary, int id, uint8_t *out_cells)
     return side;
 }
 
+// Points are turned before they are given to OpenCV, half around an axis in their plane: its IPPE
+// makes no turn of a turn by 180 degrees, and a marker seen face on is turned by just that; what is
+// turned by 180 degrees after this lies askew by 1 rad as well, as nothing does exactly. Its own
+// inverse.
+static const cv::Matx33d aside(std::cos(1.0), std::sin(1.0), 0, std::sin(1.0), -std::cos(1.0), 0, 0,
+                               0, -1);
+
 int gn_vision_solve_pose(const double *points_object, const double *rays, int n, bool is_planar,
                          struct gn_vision_pose *out_poses, struct gn_error *out_error)
 {
@@ -212,7 +220,7 @@ int gn_vision_solve_pose(const double *points_object, const double *rays, int n,
         std::vector<cv::Point2d> seen;
         for (int i = 0; i < n; i++) {
             const double *p = points_object + 3 * i;
-            points.emplace_back(p[0], p[1], p[2]);
+            points.push_back(aside * cv::Point3d(p[0], p[1], p[2]));
             seen.emplace_back(rays[2 * i], rays[2 * i + 1]);
         }
         std::vector<cv::Mat> turns, shifts;
@@ -222,6 +230,7 @@ int gn_vision_solve_pose(const double *points_object, const double *rays, int n,
         for (size_t i = 0; i < n_wanted; i++) {
             cv::Mat rotation;
             cv::Rodrigues(turns[i], rotation);
+            rotation = rotation * cv::Mat(aside);
             gn_vision_pose &pose = out_poses[n_poses];
             std::copy_n(rotation.ptr<double>(), 9, pose.rotation);
             std::copy_n(shifts[i].ptr<double>(), 3, pose.translation);

@@ -172,6 +172,34 @@ static void solves_the_pose_of_known_points(void **state)
     assert_true(gn_vision_solve_pose(points, nonsense, 4, false, poses, NULL) <= 0);
 }
 
+static void solves_what_is_seen_face_on(void **state)
+{
+    (void)state;
+    if (!gn_vision_is_built())
+        return;
+    static const double points[12] = {-.04, .04, 0, .04, .04, 0, .04, -.04, 0, -.04, -.04, 0};
+    static const double places[][2] = {{0, 0}, {-0.066, 0}, {0, 0.03}, {0.01, -0.02}};
+    for (int i = 0; i < 4 * 8; i++) { // exactly, turned by eighths
+        double c = cos(i % 8 * atan(1)), s = sin(i % 8 * atan(1)), rays[8];
+        const double rotation[9] = {c, s, 0, s, -c, 0, 0, 0, -1}, *at = places[i / 8];
+        for (int k = 0; k < 8; k++) {
+            const double *p = points + 3 * (k / 2), *r = rotation + 3 * (k % 2);
+            rays[k] = (r[0] * p[0] + r[1] * p[1] + at[k % 2]) / 0.4;
+        }
+        struct gn_vision_pose poses[2];
+        bool is_right = false;
+        int n = gn_vision_solve_pose(points, rays, 4, true, poses, NULL);
+        for (int j = 0; j < n && !is_right; j++) {
+            is_right = true;
+            for (int k = 0; k < 9; k++)
+                is_right = is_right && fabs(poses[j].rotation[k] - rotation[k]) < 1e-6;
+            for (int k = 0; k < 3; k++)
+                is_right = is_right && fabs(poses[j].translation[k] - (k < 2 ? at[k] : 0.4)) < 1e-6;
+        }
+        assert_true(is_right);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -180,6 +208,7 @@ int main(void)
         cmocka_unit_test(finds_a_marker_where_it_is),
         cmocka_unit_test(looks_only_into_the_window),
         cmocka_unit_test(solves_the_pose_of_known_points),
+        cmocka_unit_test(solves_what_is_seen_face_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
