@@ -8,8 +8,9 @@
 #include "client/track/watch.h"
 #include "tests/random.h"
 #include "tests/unit/cmocka_setup.h"
+#include "tests/unit/paper.h"
 
-enum { WIDTH = 240, HEIGHT = 160, MAX_CELLS = GN_MARKER_MAX_CELLS * GN_MARKER_MAX_CELLS };
+enum { WIDTH = GN_PAPER_WIDTH, HEIGHT = GN_PAPER_HEIGHT };
 
 static const int64_t frame_ns = INT64_C(20000000);
 static const struct gn_camera camera = {.width = WIDTH,
@@ -19,48 +20,6 @@ static const struct gn_camera camera = {.width = WIDTH,
                                         .cx = 120,
                                         .cy = 80,
                                         .world_from_camera = {.rotation = {1, 0, 0, 0}}};
-
-/** A picture that is being drawn. */
-static uint8_t pixels[WIDTH * HEIGHT];
-
-static struct gn_grey get_grey(void)
-{
-    struct gn_grey grey = {.pixels = pixels, .width = WIDTH, .height = HEIGHT};
-    for (int i = 0; i < 256; i++)
-        grey.linear[i] = (float)i / 255.0F;
-    return grey;
-}
-
-static void clear(void)
-{
-    memset(pixels, 204, sizeof(pixels));
-}
-
-/** Cells of `cell` px, upright, the top left at (x, y); a pixel is the mean of 16 points. */
-static void put_cells(const uint8_t *white, int side, double x, double y, double cell, int black)
-{
-    for (int row = (int)y - 1; row < y + side * cell + 1; row++) {
-        for (int column = (int)x - 1; column < x + side * cell + 1; column++) {
-            int sum = 0;
-            for (int i = 0; i < 16; i++) {
-                double u = (column + (i % 4 + 0.5) / 4 - x) / cell;
-                double v = (row + (i / 4 + 0.5) / 4 - y) / cell;
-                bool is_on = u >= 0 && v >= 0 && u < side && v < side;
-                sum += is_on && !white[(int)v * side + (int)u] ? black : 204;
-            }
-            pixels[row * WIDTH + column] = (uint8_t)(sum / 16);
-        }
-    }
-}
-
-/** A marker of 4x4_50. */
-static void put(int id, double x, double y, double cell)
-{
-    uint8_t white[MAX_CELLS];
-    int side = gn_marker_get_cells(0, id, white);
-    assert_int_equal(side, 6);
-    put_cells(white, side, x, y, cell, 20);
-}
 
 /** A watch for markers 7 and 9. */
 static struct gn_watch *create(void)
@@ -76,7 +35,7 @@ static struct gn_watch *create(void)
 /** Shows it what is drawn; returns how many markers it sees. */
 static int show(struct gn_watch *watch, int64_t time_ns)
 {
-    const struct gn_grey grey = get_grey();
+    const struct gn_grey grey = gn_paper_get_grey();
     int n = -1;
     assert_int_equal(gn_watch_update(watch, &grey, time_ns, NULL), 0);
     (void)gn_watch_get_sightings(watch, &n);
@@ -95,10 +54,10 @@ static void one_that_is_there_twice_tells_nothing(void **state)
     (void)state;
     struct gn_watch *watch = create();
     int n;
-    clear();
-    put(7, 20, 20, 8);
-    put(7, 90, 70, 8);
-    put(9, 160, 20, 8);
+    gn_paper_clear();
+    gn_paper_put(7, 20, 20, 8);
+    gn_paper_put(7, 90, 70, 8);
+    gn_paper_put(9, 160, 20, 8);
     assert_int_equal(show(watch, 0), 1);
     assert_int_equal(gn_watch_get_sightings(watch, &n)->id, 9);
     gn_watch_destroy(&watch);
@@ -109,11 +68,11 @@ static void each_is_seen_once_and_small_ones_beside_large(void **state)
 {
     (void)state;
     struct gn_watch *watch = create();
-    clear();
-    put(7, 30.3, 40.6, 3);
+    gn_paper_clear();
+    gn_paper_put(7, 30.3, 40.6, 3);
     assert_int_equal(show(watch, 0), 1);
     gn_watch_destroy(&watch);
-    put(9, 151.01, 60.41, 1.2); // which the look for large ones misses
+    gn_paper_put(9, 151.01, 60.41, 1.2); // which the look for large ones misses
     watch = create();
     assert_int_equal(show(watch, 0), 2);
     gn_watch_destroy(&watch);
@@ -124,8 +83,8 @@ static void what_moves_evenly_is_followed(void **state)
     (void)state;
     struct gn_watch *watch = create();
     for (int i = 0; i < 14; i++) { // 9 px a picture: edges are measured within 3 px
-        clear();
-        put(7, 10.2 + 9 * i, 20.4 + 4 * i, 8);
+        gn_paper_clear();
+        gn_paper_put(7, 10.2 + 9 * i, 20.4 + 4 * i, 8);
         assert_int_equal(show(watch, i * frame_ns), 1);
         int n;
         const double *corner = gn_watch_get_sightings(watch, &n)->corners[0];
@@ -140,11 +99,11 @@ static void what_leaps_is_looked_for_near_by(void **state)
 {
     (void)state;
     struct gn_watch *watch = create();
-    clear();
-    put(7, 60, 50, 8);
+    gn_paper_clear();
+    gn_paper_put(7, 60, 50, 8);
     assert_int_equal(show(watch, 0), 1);
-    clear();
-    put(7, 80, 64, 8);
+    gn_paper_clear();
+    gn_paper_put(7, 80, 64, 8);
     assert_int_equal(show(watch, frame_ns), 1);
     assert_int_equal(get_counts(watch).n_searched_whole, 1);
     gn_watch_destroy(&watch);
@@ -154,12 +113,12 @@ static void a_second_one_is_found_beside_the_followed(void **state)
 {
     (void)state;
     struct gn_watch *watch = create();
-    clear();
-    put(7, 30, 40, 8);
+    gn_paper_clear();
+    gn_paper_put(7, 30, 40, 8);
     for (int i = 0; i < 10; i++)
         assert_int_equal(show(watch, i * frame_ns), 1);
     assert_true(get_counts(watch).n_followed >= 8);
-    put(9, 150, 60, 8);
+    gn_paper_put(9, 150, 60, 8);
     int n_late = 0;
     while (n_late < 30 && show(watch, (10 + n_late) * frame_ns) < 2)
         n_late++;
@@ -172,9 +131,9 @@ static void times_that_go_back_are_no_reason_to_wait(void **state)
 {
     (void)state;
     struct gn_watch *watch = create();
-    clear();
+    gn_paper_clear();
     assert_int_equal(show(watch, INT64_C(60000000000)), 0);
-    put(7, 30, 40, 8);
+    gn_paper_put(7, 30, 40, 8);
     assert_int_equal(show(watch, 0), 1);
     gn_watch_destroy(&watch);
 }
@@ -184,17 +143,17 @@ static void others_of_the_dictionary_are_told_and_then_no_other_dictionary(void 
     (void)state;
     struct gn_watch *watch = create();
     struct gn_foreign_finds finds;
-    uint8_t white[MAX_CELLS];
-    clear();
-    put(3, 30, 40, 8);
+    uint8_t white[GN_PAPER_MAX_CELLS];
+    gn_paper_clear();
+    gn_paper_put(3, 30, 40, 8);
     int side = gn_marker_get_cells(gn_marker_find_dictionary("6x6_250", 7), 100, white);
-    put_cells(white, side, 140, 40, 8, 20);
+    gn_paper_put_cells(white, side, 140, 40, 8, 20);
     assert_int_equal(show(watch, 0), 0);
     assert_int_equal(gn_watch_get_strangers(watch)->n_ids, 1);
     assert_int_equal(gn_watch_get_strangers(watch)->ids[0], 3);
     assert_false(gn_watch_get_foreign(watch, &finds));
-    clear();
-    put_cells(white, side, 140, 40, 8, 20);
+    gn_paper_clear();
+    gn_paper_put_cells(white, side, 140, 40, 8, 20);
     assert_int_equal(show(watch, 20 * frame_ns), 0);
     assert_int_equal(gn_watch_get_strangers(watch)->n_ids, 0);
     assert_true(gn_watch_get_foreign(watch, &finds));
@@ -209,13 +168,13 @@ static void no_square_is_read_as_what_it_is_not(void **state)
     enum { N = 2000, N_IDS = 50 };
     int ids[N_IDS], n_read = 0;
     struct gn_reader *reader = NULL;
-    const struct gn_grey grey = get_grey();
+    const struct gn_grey grey = gn_paper_get_grey();
     uint64_t random = 5;
     for (int i = 0; i < N_IDS; i++)
         ids[i] = i;
     assert_int_equal(gn_reader_create(0, ids, N_IDS, &reader), 0);
     for (int i = 0; i < N + N_IDS; i++) {
-        uint8_t white[36] = {0}, listed[MAX_CELLS];
+        uint8_t white[36] = {0}, listed[GN_PAPER_MAX_CELLS];
         struct gn_marker_sighting seen;
         double corners[4][2] = {{40, 40}, {52, 40}, {52, 52}, {40, 52}};
         int n_wrong = 0;
@@ -223,8 +182,8 @@ static void no_square_is_read_as_what_it_is_not(void **state)
             white[6 * (k / 4 + 1) + k % 4 + 1] = gn_test_random_unit(&random) < 0.5;
         if (i >= N)
             (void)gn_marker_get_cells(0, i - N, white);
-        clear();
-        put_cells(white, 6, 40, 40, 2, 20);
+        gn_paper_clear();
+        gn_paper_put_cells(white, 6, 40, 40, 2, 20);
         if (!gn_reader_read(reader, &grey, corners, &seen)) {
             assert_true(i < N);
             continue;
@@ -247,15 +206,15 @@ static void what_is_hardly_darker_than_paper_is_not_read(void **state)
     (void)state;
     const int id = 7;
     struct gn_reader *reader = NULL;
-    const struct gn_grey grey = get_grey();
-    uint8_t white[MAX_CELLS];
+    const struct gn_grey grey = gn_paper_get_grey();
+    uint8_t white[GN_PAPER_MAX_CELLS];
     struct gn_marker_sighting seen;
     assert_int_equal(gn_reader_create(0, &id, 1, &reader), 0);
     (void)gn_marker_get_cells(0, id, white);
     for (int darker = 4; darker <= 8; darker += 4) { // 0.016 and 0.031 of full scale
         double corners[4][2] = {{40, 40}, {52, 40}, {52, 52}, {40, 52}};
-        clear();
-        put_cells(white, 6, 40, 40, 2, 204 - darker);
+        gn_paper_clear();
+        gn_paper_put_cells(white, 6, 40, 40, 2, 204 - darker);
         assert_int_equal(gn_reader_read(reader, &grey, corners, &seen), darker == 8);
     }
     gn_reader_destroy(&reader);
