@@ -236,6 +236,16 @@ static void tell_lost(struct gn_gige *s, const char *why, int64_t silent_ns)
     s->lost_why = why;
 }
 
+/** One more look: a camera that just answers may have been kept from its pictures as well. */
+static bool has_picture_now(const struct gn_gige *s, bool answers)
+{
+    gint n_empty = 0, n_filled = 0;
+    if (answers)
+        g_usleep(GN_GIGE_TICK_US);
+    arv_stream_get_n_buffers(s->device.stream, &n_empty, &n_filled);
+    return n_filled > 0;
+}
+
 /**
  * Whether a camera that has been silent for so long is to be given up. One that waits for triggers
  * may be silent for ever: its heartbeat tells. *limit_ns: the silence that it may keep, which grows
@@ -257,6 +267,8 @@ static bool is_lost(struct gn_gige *s, int64_t silent_ns, int64_t *limit_ns)
         if (silent_ns <= *limit_ns)
             return false;
     }
+    if (is_ours && has_picture_now(s, answers))
+        return false;
     bool is_kept_away = answers && gn_gige_device_count_packets(&s->device) == 0;
     tell_lost(s, !is_ours ? gone : is_kept_away ? kept_away : silent, silent_ns);
     return true;
