@@ -6,18 +6,17 @@ The environment's GNOMOND names another binary than the build's, as one made wit
 """
 import http.client
 import os
-import shutil
 import signal
 import socket
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import traceback
 
 import gnomon_pb2 as pb
+from folder import make_folder
 
 HELLO, WELCOME, REDIRECT, ERROR, BYE, PING, PONG = 1, 2, 3, 4, 5, 6, 7
 ENVIRONMENT_FRAME, POSE, CAMERA, FRAME = 16, 17, 18, 19
@@ -47,7 +46,7 @@ class Room:
     """A folder with a small scene and a configuration."""
 
     def __init__(self, settings='', server='', scene=SCENE):
-        self.path = tempfile.mkdtemp(prefix='gnomond-test.')
+        self.path = make_folder('room')
         self.write('floor.obj', FLOOR)
         self.write('cube.obj', CUBE)
         self.write('scene.json', scene)
@@ -59,9 +58,6 @@ class Room:
         with open(path, 'w') as out:
             out.write(text)
         return path
-
-    def close(self):
-        shutil.rmtree(self.path)
 
 
 def binary():
@@ -135,7 +131,6 @@ class Daemon:
             raise AssertionError('gnomond did not stop: ' + self.read_log())
         log = self.read_log()
         self.log.close()
-        self.room.close()
         for word in ('AddressSanitizer', 'LeakSanitizer', 'ThreadSanitizer', 'runtime error'):
             assert word not in log, log
         assert self.is_killed or status == 0, 'exit status %d: %s' % (status, log)
@@ -149,7 +144,6 @@ class Daemon:
             self.process.kill()
             self.process.wait()
             self.log.close()
-            self.room.close()
         else:
             self.stop()
 

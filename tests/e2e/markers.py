@@ -9,13 +9,12 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, sys.argv[2])
+from folder import Folder  # noqa: E402
 from gnomond import *  # noqa: E402,F403
 from pictures import exr_bytes, png_bytes, read_png, y4m_bytes  # noqa: E402
 
@@ -31,11 +30,11 @@ MARKERS = {'dictionary': '4x4_50', 'bodies': [
                                 'first_id': 20}]}]}
 
 
-class Desk:
+class Desk(Folder):
     """A folder with the shots, their truth, the markers' and the camera's files."""
 
     def __init__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-markers-test.')
+        super().__init__()
         self.write('markers.json', json.dumps(MARKERS))
         self.write('camera.json', json.dumps(CAMERA))
         os.mkdir(self.at('shots'))
@@ -45,19 +44,10 @@ class Desk:
         with open(self.at('light.exr'), 'wb') as light:
             light.write(exr_bytes(32, 16, (1, 1, 1)))
 
-    def at(self, name):
-        return os.path.join(self.path, name)
-
     def write(self, name, text):
         with open(self.at(name), 'w') as out:
             out.write(text)
         return self.at(name)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        shutil.rmtree(self.path)
 
 
 def gnomon(*arguments):

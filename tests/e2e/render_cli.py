@@ -10,8 +10,9 @@ import os
 import struct
 import subprocess
 import sys
-import tempfile
 import zlib
+
+from folder import make_folder
 
 PROGRAM = os.path.abspath(sys.argv[1])
 FLOOR = 'v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n'
@@ -451,24 +452,23 @@ def main():
     tests = [(name, test) for name, test in globals().items() if name.startswith('test_')]
     print('1..%d' % len(tests))
     failed = 0
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        write('floor.obj', FLOOR)
-        write('box.obj', BOX)
-        write('scene.json', json.dumps(SCENE))
-        write('camera.json', json.dumps(CAMERA))
-        write('white.hdr', make_hdr(32, 16))
-        write('grey.png', make_png(64, 48, 128))
-        for number, (name, test) in enumerate(tests, 1):
-            try:
-                test()
-                print('ok %d - %s' % (number, name))
-            except (AssertionError, OSError, subprocess.TimeoutExpired, ValueError, KeyError) as error:
-                failed += 1
-                print('# %s' % str(error).replace('\n', ' '))
-                print('not ok %d - %s' % (number, name))
-            sys.stdout.flush()
-        os.chdir('/')
+    os.chdir(make_folder('files'))
+    write('floor.obj', FLOOR)
+    write('box.obj', BOX)
+    write('scene.json', json.dumps(SCENE))
+    write('camera.json', json.dumps(CAMERA))
+    write('white.hdr', make_hdr(32, 16))
+    write('grey.png', make_png(64, 48, 128))
+    for number, (name, test) in enumerate(tests, 1):
+        try:
+            test()
+            print('ok %d - %s' % (number, name))
+        except (AssertionError, OSError, subprocess.TimeoutExpired, ValueError, KeyError) as error:
+            failed += 1
+            print('# %s' % str(error).replace('\n', ' '))
+            print('not ok %d - %s' % (number, name))
+        sys.stdout.flush()
+    os.chdir('/')
     return 1 if failed else 0
 
 

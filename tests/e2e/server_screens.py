@@ -6,10 +6,8 @@ usage: server_screens.py GNOMOND DIRECTORY_OF_GNOMON_PB2 GNOMON
 """
 import json
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, sys.argv[2])
@@ -164,7 +162,7 @@ def gnomon(daemon, *arguments):
 
 def test_command():
     """gnomon screen: files of every kind, one after another."""
-    folder = tempfile.mkdtemp(prefix='gnomon-screen-test.')
+    folder = make_folder('files')
 
     def at(name, data=None):
         if data is not None:
@@ -172,33 +170,30 @@ def test_command():
                 out.write(data)
         return os.path.join(folder, name)
 
-    try:
-        at('a.png', png_bytes(4, 2, RED * 8))
-        at('b.exr', exr_bytes(4, 2, (.01, .01, 1)))
-        with open_room() as daemon, Viewer(daemon) as viewer:
-            status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('a.png'))
-            assert (status, err) == (0, '') and '1 pictures sent' in out, (status, out, err)
-            wait_for_shown(daemon, 1)
-            red = look(viewer)
-            assert red[0] > 60 and red[0] > 2 * red[2], list(red)
-            status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('*.*'), '--rate', '50',
-                                      '--loop', '--count', '4')
-            assert (status, err) == (0, '') and '4 pictures sent' in out, (status, out, err)
-            deadline = time.monotonic() + 60
-            while not look(viewer)[2] > 60:
-                assert time.monotonic() < deadline, read_room(daemon)
-            blue = look(viewer)
-            assert blue[2] > 2 * blue[0], list(blue)
-            status, out, err = gnomon(daemon, '--stream', 'radio', '--files', at('a.png'))
-            assert status == 1 and 'tv, wall' in err and err.count('\n') == 1, (status, err)
-            assert 'sent' not in out, out
-            at('wide.png', png_bytes(2049, 1, RED * 2049))
-            status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('wide.png'))
-            assert status == 1 and '2049x1' in err and '2048' in err, (status, err)
-            status, out, err = gnomon(daemon, '--files', at('a.png'))
-            assert status == 2 and 'stream' in err, (status, err)
-    finally:
-        shutil.rmtree(folder)
+    at('a.png', png_bytes(4, 2, RED * 8))
+    at('b.exr', exr_bytes(4, 2, (.01, .01, 1)))
+    with open_room() as daemon, Viewer(daemon) as viewer:
+        status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('a.png'))
+        assert (status, err) == (0, '') and '1 pictures sent' in out, (status, out, err)
+        wait_for_shown(daemon, 1)
+        red = look(viewer)
+        assert red[0] > 60 and red[0] > 2 * red[2], list(red)
+        status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('*.*'), '--rate', '50',
+                                  '--loop', '--count', '4')
+        assert (status, err) == (0, '') and '4 pictures sent' in out, (status, out, err)
+        deadline = time.monotonic() + 60
+        while not look(viewer)[2] > 60:
+            assert time.monotonic() < deadline, read_room(daemon)
+        blue = look(viewer)
+        assert blue[2] > 2 * blue[0], list(blue)
+        status, out, err = gnomon(daemon, '--stream', 'radio', '--files', at('a.png'))
+        assert status == 1 and 'tv, wall' in err and err.count('\n') == 1, (status, err)
+        assert 'sent' not in out, out
+        at('wide.png', png_bytes(2049, 1, RED * 2049))
+        status, out, err = gnomon(daemon, '--stream', 'tv', '--files', at('wide.png'))
+        assert status == 1 and '2049x1' in err and '2048' in err, (status, err)
+        status, out, err = gnomon(daemon, '--files', at('a.png'))
+        assert status == 2 and 'stream' in err, (status, err)
 
 
 run_tests([test_red_to_blue_in_the_dark, test_pieces, test_beside_a_probe, test_refusals, test_command])

@@ -17,7 +17,6 @@ def refuse(room, *words, arguments=()):
     doors = [x for door in ('--listen', '--http') if door not in arguments
              for x in (door, '127.0.0.1:0')]
     status, text = start_badly('--config', room.config, '--log', 'W', *doors, *arguments)
-    room.close()
     assert status not in (0, -6, -11), (status, text)
     lines = [line for line in text.splitlines() if line.startswith('gnomond: ')]
     assert len(lines) == 1, text

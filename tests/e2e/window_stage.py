@@ -5,13 +5,12 @@ import ctypes
 import json
 import os
 import random
-import shutil
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 
+from folder import make_folder
 from gnomond import Daemon
 from pictures import png_bytes, read_png
 
@@ -47,7 +46,7 @@ class Screen:
     """An X server whose frame buffer is a file: XWD, as its XWDFile.h has it."""
 
     def __init__(self, width=800, height=600):
-        self.path = tempfile.mkdtemp(prefix='gnomon-screen.')
+        self.path = make_folder('screen')
         ours, its = os.pipe()
         self.process = subprocess.Popen(
             ['Xvfb', '-displayfd', str(its), '-screen', '0', '%dx%dx24' % (width, height),
@@ -102,14 +101,13 @@ class Screen:
     def __exit__(self, *_):
         self.process.terminate()
         self.process.wait()
-        shutil.rmtree(self.path)
 
 
 class View:
     """gnomon view in a folder of its own, and its window if there is a screen."""
 
     def __init__(self, address, *more, screen=None, env=None, title='gnomon: room demo'):
-        self.path = tempfile.mkdtemp(prefix='gnomon-window-test.')
+        self.path = make_folder('view')
         self.screen, self.id = screen, None
         os.mkdir(self.at('shots'))
         with open(self.at('camera.json'), 'w') as out:
@@ -178,7 +176,6 @@ class View:
         self.process.wait()
         self.out.close()
         self.err.close()
-        shutil.rmtree(self.path)
 
 
 def lit(listen='127.0.0.1:0'):
@@ -223,10 +220,9 @@ class Watch:
         try:
             return wait_for(what, look)
         except AssertionError:
-            with tempfile.NamedTemporaryFile(prefix='gnomon-window-test.', suffix='.png',
-                                             delete=False) as out:
+            with open(self.view.at('window.png'), 'wb') as out:
                 out.write(png_bytes(*self.view.see()))
-            print('# the window is kept in ' + out.name)
+            print('# with GN_KEEP the window is in ' + out.name)
             raise
 
     def wait_composite(self):

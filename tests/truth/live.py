@@ -17,7 +17,8 @@ import signal
 import sys
 import time
 
-sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path[1:1] = [TESTS, os.path.join(TESTS, 'e2e')]
 import own_network  # noqa: E402
 from live_stage import (HEIGHT, MARKER, WIDTH, Stage, describe, judge, load,  # noqa: E402
                         make_sequence)

@@ -9,8 +9,9 @@ import re
 import shutil
 import signal
 import subprocess
-import tempfile
 import time
+
+from folder import make_folder
 
 LIMIT = 2.0  # 8-bit codes, mean absolute
 SHARE = 0.2  # of the untouched frame's error
@@ -92,7 +93,7 @@ class Stage:
     def __init__(self, rig, gnomond, gnomon, fake_gige, sequence):
         self.rig, self.gnomond, self.gnomon, self.fake_gige = rig, gnomond, gnomon, fake_gige
         self.sequence, self.running = sequence, []
-        self.folder = tempfile.mkdtemp(prefix='gnomon-live-test.')
+        self.folder = make_folder('stage')
         self.root = load(os.path.join(sequence, 'sequence.json'))
         self.frame, self.probe = self.root['frames'][-1], self.root['environment']
         self.setup = save(os.path.join(self.folder, 'setup.json'), self.probe)
@@ -143,7 +144,6 @@ class Stage:
             if program.process.poll() is None:
                 program.process.kill()
                 program.process.wait()
-        shutil.rmtree(self.folder)
 
 
 def judge(stage, out):

@@ -12,11 +12,8 @@ import json
 import math
 import os
 import re
-import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 import time
 
 import numpy
@@ -27,6 +24,7 @@ import own_network  # noqa: E402
 import sequences  # noqa: E402
 import shell  # noqa: E402
 from chart import CHART  # noqa: E402
+from folder import make_folder  # noqa: E402
 from live_stage import HEIGHT, WIDTH, load, make_sequence  # noqa: E402
 from pictures import png_bytes  # noqa: E402
 
@@ -92,8 +90,8 @@ class Desk:
     """The folder, and all that runs in it."""
 
     def __init__(self):
-        self.path = tempfile.mkdtemp(prefix='gnomon-tutorial-test.')
-        self.work = tempfile.mkdtemp(prefix='gnomon-tutorial-cameras.')
+        self.path = make_folder('desk')
+        self.work = make_folder('cameras')
         self.running = []
         path = ':'.join(os.path.join(BUILD, d) for d in ('server', 'client'))
         self.env = dict(os.environ, PATH=path + ':' + os.environ['PATH'], SDL_VIDEODRIVER='dummy')
@@ -133,16 +131,11 @@ class Desk:
         block = re.sub(r'(gnomon calibrate \w+ --gige \S+)', r'\1 --frame-rate 100', block)
         return shell.run(block, self.path, self.env, until, 100)
 
-    def rest(self):
+    def end(self):
         for camera in self.running:
             camera.kill()
             camera.communicate()
         self.running = []
-
-    def end(self):
-        self.rest()
-        shutil.rmtree(self.path)
-        shutil.rmtree(self.work)
 
 
 def step_print(desk, block):
@@ -214,7 +207,6 @@ STEPS = [step_print, step_lens, step_response, step_probe_response, step_orienta
 
 def main():
     own_network.enter()
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     steps = get_steps()
     assert len(steps) == len(STEPS), [title for title, _ in steps]
     print('1..%d' % len(steps))
@@ -228,7 +220,7 @@ def main():
             except (AssertionError, OSError, KeyError, RuntimeError) as fault:
                 failed = 1
                 print('# %s\nnot ok %d - %s' % (repr(fault).replace('\n', '\n# '), n, title))
-            desk.rest()
+            desk.end()
     finally:
         desk.end()
     return failed

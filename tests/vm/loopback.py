@@ -15,7 +15,7 @@ import signal
 import sys
 
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-sys.path[1:1] = [TESTS, os.path.join(TESTS, 'truth')]
+sys.path[1:1] = [TESTS, os.path.join(TESTS, 'e2e'), os.path.join(TESTS, 'truth')]
 import own_network  # noqa: E402
 from live_stage import (HEIGHT, MARKER, WIDTH, Stage, describe, judge,  # noqa: E402
                         make_sequence)
@@ -118,10 +118,6 @@ def main():
         found.append(str(fault) or 'an assertion failed')
     finally:
         stage.end()
-        if os.environ.get('GN_KEEP'):
-            print('# kept ' + machine.path)
-        else:
-            machine.close()
     for problem in found:
         print('# ' + problem.replace('\n', '\n# '))
     print('%s 1 - a V4L2 camera, its pose from a marker' % ('not ok' if found else 'ok'))

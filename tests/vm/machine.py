@@ -9,7 +9,8 @@ import os
 import shlex
 import shutil
 import subprocess
-import tempfile
+
+from folder import make_folder
 
 TOOLS = ('qemu-system-x86_64', 'busybox', 'v4l2-ctl')
 # Drivers of cameras, and what makes each have one, /dev/video0.
@@ -77,7 +78,7 @@ class Machine:
 
     def __init__(self, kernel, driver='vivid'):
         self.kernel, self.driver = kernel, driver
-        self.path = tempfile.mkdtemp(prefix='gnomon-vm.')
+        self.path = make_folder('machine')
 
     def at(self, name):
         return os.path.join(self.path, name)
@@ -132,9 +133,6 @@ class Machine:
 
     def get_bytes(self, name):
         return read(os.path.join(self.path, 'out', name))
-
-    def close(self):
-        shutil.rmtree(self.path)
 
 
 def quote(*words):

@@ -273,11 +273,5 @@ if reason:
     print('1..0 # SKIP ' + reason)
     sys.exit(0)
 machine = Machine(KERNEL)
-try:
-    run_machine()
-    run_tests([test for name, test in sorted(globals().items()) if name.startswith('test_')])
-finally:
-    if not os.environ.get('GN_KEEP'):
-        machine.close()
-    else:
-        print('# kept ' + machine.path)
+run_machine()
+run_tests([test for name, test in sorted(globals().items()) if name.startswith('test_')])
