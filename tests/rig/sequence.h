@@ -80,6 +80,7 @@ struct gn_rig_errors {
     long pixels;
     double composite; // |composite - truth|
     double untouched; // |camera frame - truth|
+    double noise;     // standard error of the truth's own values
 };
 
 /** One frame, or all: [0 object, 1 shadow]. */

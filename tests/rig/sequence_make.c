@@ -515,6 +515,7 @@ static int write_bounces(const struct maker *m, const json_t *direct, struct gn_
             add_text(f, shared[k], "../%s", json_string_value(json_object_get(f, shared[k])));
         add_text(f, "picture", "../camera_bounces/%04zu.png", i);
         add_text(f, "truth", "../truth_bounces/%04zu.png", i);
+        add_text(f, "truth_layer", "bounces");
     }
     int result = write_json(m, "bounces/sequence.json", s, error);
     json_decref(s);

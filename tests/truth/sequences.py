@@ -10,7 +10,7 @@ import os
 import subprocess
 
 OPTIONS = ("--width", "80", "--height", "60", "--zoom", "2", "--frames-per-light", "1",
-           "--direct-paths", "512")
+           "--direct-paths", "512", "--paths", "8")
 MAPS = "interior", "sunrise", "city"
 
 

@@ -5,6 +5,7 @@
 #include "tests/unit/cmocka_setup.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +17,7 @@
 #include "server/scene/scene.h"
 #include "tests/rig/room.h"
 #include "tests/rig/sequence.h"
+#include "tests/rig/vec.h"
 
 static const char *const directories[2] = {"rig-sequence-a", "rig-sequence-b"};
 
@@ -146,6 +148,34 @@ static void test_judge(void **state)
     gn_rig_sequence_finish(&sequence);
 }
 
+/* Truths of other seeds differ as the noise of both says: two normal numbers of one deviation by
+ * 2 / sqrt(pi) of it. */
+static void check_noise(const struct gn_rig_sequence *sequence, const char *other)
+{
+    static const char *const parts[2] = {"object", "shadow"};
+    json_t *report;
+    assert_int_equal(gn_rig_judge(sequence, other, NULL, &report, NULL), 0);
+    for (int i = 0; i < 2; i++) {
+        double expected = 2 / sqrt(GN_RIG_PI) * get_figure(report, parts[i], "noise");
+        double found = get_figure(report, parts[i], "composite");
+        print_message("# %s: %s off by %.2f, %.2f expected\n", other, parts[i], found, expected);
+        assert_true(found > 0.7 * expected && found < 1.3 * expected);
+    }
+    json_decref(report);
+}
+
+static void test_noise(void **state)
+{
+    struct gn_rig_sequence direct, bounced;
+    (void)state;
+    assert_int_equal(gn_rig_sequence_read("rig-sequence-a", &direct, NULL), 0);
+    assert_int_equal(gn_rig_sequence_read("rig-sequence-a/bounces", &bounced, NULL), 0);
+    check_noise(&direct, "rig-sequence-b/truth"); // of seed 8 since test_cache
+    check_noise(&bounced, "rig-sequence-b/truth_bounces");
+    gn_rig_sequence_finish(&direct);
+    gn_rig_sequence_finish(&bounced);
+}
+
 static void test_sheet(void **state)
 {
     const struct gn_rig_sheet_options options = {.title = "test",
@@ -207,8 +237,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_cache),
-        cmocka_unit_test(test_judge),      cmocka_unit_test(test_sheet),
-        cmocka_unit_test(test_scene),
+        cmocka_unit_test(test_judge),      cmocka_unit_test(test_noise),
+        cmocka_unit_test(test_sheet),      cmocka_unit_test(test_scene),
     };
     return cmocka_run_group_tests(tests, remove_all, remove_all);
 }
