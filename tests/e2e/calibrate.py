@@ -91,7 +91,7 @@ def check_response(path, scale):
         found = math.exp((A + B * math.log(C + x) - r['a']) / r['b']) - r['c']
         worst = max(worst, abs(found * scale / x - 1))
     print('# log curve: worst %.2f %% of five decades' % (100 * worst))
-    assert worst < .03, worst
+    assert worst < .01, worst
 
 
 def check_chart():

@@ -225,14 +225,14 @@ static void a_marker_at_500_mm_is_where_it_is(void **state)
     read_text("4x4_50:7:0.08", &bodies);
     judge_stills("4x4 marker of 80 mm", &bodies, 15, &e);
     assert_int_equal(e.n, 15);
-    assert_true(get_median(e.m, e.n) < 0.5e-3);
-    assert_true(get_median(e.rad, e.n) < 0.2 * degree);
+    assert_true(get_median(e.m, e.n) < 0.05e-3);
+    assert_true(get_median(e.rad, e.n) < 0.05 * degree);
     gn_bodies_finish(&bodies);
     read_text("apriltag_36h11:12:0.08", &bodies);
     judge_stills("36h11 marker of 80 mm", &bodies, 5, &e);
     assert_int_equal(e.n, 5);
-    assert_true(get_median(e.m, e.n) < 0.5e-3);
-    assert_true(get_median(e.rad, e.n) < 0.2 * degree);
+    assert_true(get_median(e.m, e.n) < 0.05e-3);
+    assert_true(get_median(e.rad, e.n) < 0.05 * degree);
     gn_bodies_finish(&bodies);
 }
 
@@ -291,7 +291,7 @@ static void our_corners_beat_opencvs(void **state)
         best = fmin(best, off);
     }
     judge_stills("ours", &bodies, 5, &e);
-    assert_true(get_median(e.m, e.n) < best / 5);
+    assert_true(get_median(e.m, e.n) < best / 50);
     gn_bodies_finish(&bodies);
 }
 
@@ -317,9 +317,9 @@ static void a_board_at_500_mm_is_where_it_is(void **state)
     read_board(&bodies);
     judge_stills("board of 4 x 3", &bodies, 5, &e);
     assert_int_equal(e.n, 5);
-    assert_true(get_median(e.m, e.n) < 0.2e-3);
-    assert_true(get_median(e.rad, e.n) < 0.05 * degree);
-    assert_true(get_median(e.camera_m, e.n) < 0.2e-3);
+    assert_true(get_median(e.m, e.n) < 0.03e-3);
+    assert_true(get_median(e.rad, e.n) < 0.015 * degree);
+    assert_true(get_median(e.camera_m, e.n) < 0.1e-3);
     gn_bodies_finish(&bodies);
 }
 
@@ -363,8 +363,8 @@ static void judge_rest(const char *text, const struct gn_bodies *bodies)
                   "%.4f mm\n",
                   text, 1e3 * still, 1e3 * get_jitter(measured + BEGIN, N - BEGIN),
                   1e3 * get_jitter(marker + BEGIN, N - BEGIN));
-    assert_true(still < 0.1e-3);
-    assert_true(get_jitter(marker + BEGIN, N - BEGIN) < 0.1e-3);
+    assert_true(still < 0.05e-3);
+    assert_true(get_jitter(marker + BEGIN, N - BEGIN) < 0.02e-3);
     gn_image_finish(&linear);
     gn_tracker_destroy(&tracker);
 }

@@ -127,7 +127,7 @@ static void test_rig_frames(void **unused)
         assert_true(seen >= 8);
         worst = fmax(worst, error);
     }
-    assert_true(worst < 0.3);
+    assert_true(worst < 0.08);
     gn_pool_destroy(&pool);
 }
 

@@ -183,7 +183,7 @@ static void test_rig_pictures(void **unused)
         worst_m = fmax(worst_m, m);
         chi2 += pow(deg / (found.error_rad * 180 / PI), 2) / n_cases;
     }
-    assert_true(worst < 0.3 && worst_m < 0.003);
+    assert_true(worst < 0.15 && worst_m < 0.0016);
     // The errors said are neither empty nor idle: three axes, each no worse than the worst.
     assert_true(chi2 < 3 && chi2 > 0.05);
 }
