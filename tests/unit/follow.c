@@ -78,6 +78,51 @@ static void follows_what_is_there(void **state)
     free(pixels);
 }
 
+/** A light speck on one edge: the rest of it says where it is. */
+static void follows_edges_that_have_a_speck(void **state)
+{
+    (void)state;
+    uint8_t *pixels = malloc(WIDTH * HEIGHT);
+    const struct gn_pattern pattern = {CELLS, white};
+    struct gn_camera camera = get_camera();
+    double corners[4][2];
+    draw(pixels, white, 70.3, 50.9);
+    for (int row = 46; row < 53; row++) // white, down to two pixels into the black
+        memset(pixels + row * WIDTH + 92, lround(0.8 * 255), 3);
+    const struct gn_grey grey = get_grey(pixels);
+    set_corners(corners, 71, 50);
+    assert_true(gn_follow_marker(&grey, &camera, &pattern, corners));
+    for (int k = 0; k < 4; k++) {
+        assert_true(fabs(corners[k][0] - 70.3 - (k == 1 || k == 2 ? 60 : 0)) < 0.08);
+        assert_true(fabs(corners[k][1] - 50.9 - (k >= 2 ? 60 : 0)) < 0.08);
+    }
+    free(pixels);
+}
+
+static void edges_are_not_guessed_far_off_or_where_light_is_even(void **state)
+{
+    (void)state;
+    uint8_t *pixels = malloc(WIDTH * HEIGHT);
+    struct gn_camera camera = get_camera();
+    for (int off = 2; off <= 6; off += 4) { // px
+        double corners[4][2];
+        draw(pixels, white, 70, 50);
+        const struct gn_grey grey = get_grey(pixels);
+        set_corners(corners, 70 + off, 50);
+        assert_int_equal(gn_edges_refine(&grey, &camera, CELLS, corners), off == 2);
+    }
+    for (int contrast = 2; contrast <= 16; contrast += 14) { // of 255
+        double corners[4][2];
+        draw(pixels, white, 70, 50);
+        for (int i = 0; i < WIDTH * HEIGHT; i++)
+            pixels[i] = (uint8_t)(100 + pixels[i] * contrast / 255);
+        const struct gn_grey grey = get_grey(pixels);
+        set_corners(corners, 70, 50);
+        assert_int_equal(gn_edges_refine(&grey, &camera, CELLS, corners), contrast == 16);
+    }
+    free(pixels);
+}
+
 static void refuses_another_marker_and_none(void **state)
 {
     (void)state;
@@ -112,6 +157,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_what_is_there),
+        cmocka_unit_test(follows_edges_that_have_a_speck),
+        cmocka_unit_test(edges_are_not_guessed_far_off_or_where_light_is_even),
         cmocka_unit_test(refuses_another_marker_and_none),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
