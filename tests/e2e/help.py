@@ -4,6 +4,7 @@
 
 usage: help.py GNOMOND GNOMON GNOMON_RENDER
 """
+import glob
 import os
 import re
 import subprocess
@@ -133,6 +134,23 @@ def check_accepted(name):
     assert listed <= taken, '%s lists what no command line here has: %s' % (name, sorted(listed - taken))
 
 
+def check_documents():
+    """Commands in the documents name options that these commands have."""
+    root, known, n = os.path.join(os.path.dirname(os.path.abspath(__file__)), '../..'), {}, 0
+    for command, wanted in OPTIONS:
+        if command[0] == GNOMON:
+            known[' '.join(command[1:])] = wanted | {'help', 'version'}
+    words = re.compile(r'\bgnomon (%s)\b((?:\\\\\n|[^`\n|&;])*)' % '|'.join(known))
+    for path in glob.glob(os.path.join(root, '*.md')) + glob.glob(os.path.join(root, 'docs/*.md')):
+        with open(path, encoding='utf-8') as f:
+            for command, rest in words.findall(f.read()):
+                for option in re.findall(r'(?<![\w-])--([a-z][a-z0-9-]*)', rest):
+                    n += 1
+                    assert {option, re.sub('^no-', '', option)} & known[command], (
+                        '%s: gnomon %s has no --%s' % (os.path.basename(path), command, option))
+    assert n > 100, '%d options only' % n
+
+
 def check_program():
     """gnomon itself and gnomon calibrate: each command once, with a summary."""
     text = ask(GNOMON, '--help')
@@ -149,7 +167,7 @@ def check_program():
 
 def main():
     failed = 0
-    tests = [('gnomon', check_program, ())]
+    tests = [('gnomon', check_program, ()), ('documents', check_documents, ())]
     tests += [(' '.join([c[0].rsplit('/', 1)[1]] + c[1:]), check_options, (c, w)) for c, w in OPTIONS]
     tests += [('gnomon %s takes what it lists' % name, check_accepted, (name,)) for name in WAYS]
     print('1..%d' % len(tests))
