@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: ISC
 """The rig's sequences that the tests of this folder share: path-traced by the one that comes first.
 
-The camera looks at the teapot from near by: 80 x 60 pixels as fine as those of 160 x 120 with the
+The camera looks at the teapot from near by: 60 x 45 pixels as fine as those of 120 x 90 with the
 whole table, and the same ones are judged, as only what the teapot changes is.
 """
 import fcntl
 import os
 import subprocess
 
-OPTIONS = ("--width", "80", "--height", "60", "--zoom", "2", "--frames-per-light", "1",
+OPTIONS = ("--width", "60", "--height", "45", "--zoom", "2", "--frames-per-light", "1",
            "--direct-paths", "512", "--paths", "8")
 MAPS = "interior", "sunrise", "city"
 
