@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <memory>
 #include <new>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "client/vision/guard.hpp"
+#include "client/vision/squares.hpp"
 #include "common/image.h"
 
 namespace {
@@ -64,6 +66,7 @@ void look_closely(cv::aruco::DetectorParameters &p)
 struct gn_marker_finder {
     cv::Ptr<cv::aruco::Dictionary> dictionary;
     cv::Ptr<cv::aruco::DetectorParameters> parameters;
+    std::unique_ptr<gn_squares> squares; // nullptr: OpenCV itself, as it alone refines
     std::vector<std::vector<cv::Point2f>> corners, unread;
     std::vector<int> ids;
     cv::Mat enlarged;
@@ -122,6 +125,8 @@ int gn_marker_finder_create(const struct gn_marker_finder_options *options,
         finder->scale = o.is_small ? 2 : 1;
         if (o.is_small)
             look_closely(*finder->parameters);
+        if (o.refinement == GN_MARKER_REFINE_NONE)
+            finder->squares = std::make_unique<gn_squares>(finder->dictionary, finder->parameters);
         *out_finder = finder.release();
         return 0;
     });
@@ -160,8 +165,11 @@ int gn_marker_finder_find(struct gn_marker_finder *finder, const uint8_t *grey, 
                        cv::INTER_LINEAR);
             searched = finder->enlarged;
         }
-        cv::aruco::detectMarkers(searched, finder->dictionary, finder->corners, finder->ids,
-                                 finder->parameters, finder->unread);
+        if (finder->squares)
+            finder->squares->find(searched, finder->corners, finder->ids, finder->unread);
+        else
+            cv::aruco::detectMarkers(searched, finder->dictionary, finder->corners, finder->ids,
+                                     finder->parameters, finder->unread);
         int n = static_cast<int>(std::min<size_t>(finder->ids.size(), size_t(max_sightings)));
         for (int i = 0; i < n; i++) {
             out_sightings[i].id = finder->ids[size_t(i)];
