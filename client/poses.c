@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "client/feature.h"
+#include "client/live.h"
 #include "client/vision/markers.h"
 #include "common/clock.h"
 #include "common/device_json.h"
@@ -124,6 +125,7 @@ int gn_poses_open(const struct gn_options *options, const struct gn_camera *came
     const struct gn_tracker_options wanted = {
         .camera = camera,
         .bodies = &p->bodies,
+        .is_live = gn_live_count_asked(options) > 0,
         .is_raw = object || !gn_options_get_bool(options, NULL, NULL, "steady")};
     if (!err)
         err = gn_tracker_create(&wanted, &p->tracker, out_error);

@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ALL, SMALL, N_FINDERS }; // what sizes a finder is for
+enum { ALL, SMALL, FINE, MIDDLE, COARSE, N_FINDERS }; // as the bits of gn_search_look
+/** What is dark is told by a mean of so many px; 0: by all of these. */
+static const int windows[N_FINDERS] = {[FINE] = 3, [MIDDLE] = 13, [COARSE] = 23};
 enum { MAX_QUADS = 1024 };
 
 /** Least correlation with its pattern of a marker that OpenCV has read. */
@@ -38,8 +40,8 @@ int gn_search_create(const struct gn_search_options *o, struct gn_search **out_s
     s->ids = calloc((size_t)o->n_ids + 1, sizeof(*s->ids));
     int err = s->ids ? 0 : gn_error_set(out_error, -ENOMEM, "out of memory");
     for (int i = 0; !err && i < N_FINDERS; i++) {
-        const struct gn_marker_finder_options wanted = {.dictionary = o->dictionary,
-                                                        .is_small = i == SMALL};
+        const struct gn_marker_finder_options wanted = {
+            .dictionary = o->dictionary, .is_small = i == SMALL, .window = windows[i]};
         err = gn_marker_finder_create(&wanted, &s->finders[i], out_error);
     }
     if (!err && gn_reader_create(o->dictionary, o->ids, o->n_ids, &s->reader) < 0)
@@ -149,7 +151,8 @@ static int look(struct gn_search *s, int which, const struct gn_grey *grey,
     }
     n = gn_marker_finder_get_unread(s->finders[which], MAX_QUADS, s->quads);
     for (int i = 0; i < n; i++)
-        if (!read_square(s, grey, to_edge_px, s->quads[i], finds) && which == ALL)
+        if (!read_square(s, grey, to_edge_px, s->quads[i], finds) && which != SMALL &&
+            s->n_unread < MAX_QUADS)
             memcpy(s->unread[s->n_unread++], s->quads[i], sizeof(s->quads[i]));
     return 0;
 }
@@ -167,13 +170,15 @@ static bool has_all(const struct gn_search *s, const struct gn_search_finds *fin
 }
 
 int gn_search_find(struct gn_search *s, const struct gn_grey *grey,
-                   const struct gn_marker_window *window, bool with_small,
+                   const struct gn_marker_window *window, unsigned looks,
                    struct gn_search_finds *out_finds, struct gn_error *out_error)
 {
     out_finds->n_found = out_finds->n_coarse = 0;
     s->n_unread = 0;
-    int err = look(s, ALL, grey, window, out_finds, out_error);
-    if (!err && with_small && !has_all(s, out_finds))
-        err = look(s, SMALL, grey, window, out_finds, out_error);
+    static const int order[] = {ALL, FINE, MIDDLE, COARSE, SMALL};
+    int err = 0;
+    for (size_t i = 0; i < GN_ARRAY_LEN(order) && !err; i++)
+        if (looks >> order[i] & 1 && (order[i] != SMALL || !has_all(s, out_finds)))
+            err = look(s, order[i], grey, window, out_finds, out_error);
     return err;
 }

@@ -21,6 +21,17 @@ struct gn_search_options {
     int n_ids;
 };
 
+/** Ways to look at a picture, bits. The last three are WHOLE's parts, each a third of its cost:
+ * what is dark in surroundings of 3, 13 and 23 px. A marker is mostly found by the last two alike.
+ */
+enum gn_search_look {
+    GN_SEARCH_WHOLE = 1,
+    GN_SEARCH_SMALL = 2, // for cells from 3 px down to 1.2 px, as dear as WHOLE
+    GN_SEARCH_FINE = 4,
+    GN_SEARCH_MIDDLE = 8,
+    GN_SEARCH_COARSE = 16,
+};
+
 /** What is in a picture. */
 struct gn_search_finds {
     int n_found;
@@ -41,11 +52,11 @@ void gn_search_destroy(struct gn_search **search);
 /**
  * Finds the dictionary's markers in window (NULL: everywhere) of a picture of the camera's: each
  * once, but an id as often as it is there. Ids that are not looked for are found where OpenCV
- * reads them. with_small: looks closer where not all ids are found, for cells from 3 px down to 1.2
- * px, at three times the cost. Returns 0, or a negative errno and a sentence.
+ * reads them. looks: some of gn_search_look, SMALL only where not all ids are found by the others.
+ * Returns 0, or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_search_find(struct gn_search *search, const struct gn_grey *grey,
-                               const struct gn_marker_window *window, bool with_small,
+                               const struct gn_marker_window *window, unsigned looks,
                                struct gn_search_finds *out_finds, struct gn_error *out_error);
 
 /**

@@ -74,7 +74,7 @@ int gn_tracker_create(const struct gn_tracker_options *options, struct gn_tracke
     bool is_unset = memcmp(&options->filter, &unset, sizeof(unset)) == 0;
     for (int i = 0; i < GN_BODY_MAX_BODIES; i++)
         t->memory[i].filter.options = is_unset ? GN_POSE_FILTER_DEFAULTS : options->filter;
-    int err = gn_watch_create(&t->camera, t->bodies, &t->watch, out_error);
+    int err = gn_watch_create(&t->camera, t->bodies, options->is_live, &t->watch, out_error);
     t->points = calloc(GN_BODY_MAX_MARKERS * 4, sizeof(*t->points));
     t->seen = calloc(GN_BODY_MAX_MARKERS * 4, sizeof(*t->seen));
     if (!err && (!t->points || !t->seen || gn_jpeg_create(&t->jpeg) < 0 ||

@@ -29,6 +29,7 @@ struct gn_tracker_options {
     const struct gn_camera *camera;       // copied; a table of its response is borrowed
     const struct gn_bodies *bodies;       // borrowed until the tracker is destroyed
     bool is_raw;                          // no filter: each pose as it was measured
+    bool is_live;                         // see gn_watch_create()
     struct gn_pose_filter_options filter; // all-zero: GN_POSE_FILTER_DEFAULTS
 };
 

@@ -19,6 +19,10 @@ enum {
 static const struct interval {
     int64_t whole_ns, small_ns;
 } soon = {0, INT64_C(100000000)}, later = {INT64_C(150000000), INT64_C(300000000)};
+/** What live pictures share of the later searches, in turn, and how long each lasts, ns. */
+static const unsigned shares[] = {GN_SEARCH_MIDDLE, GN_SEARCH_SMALL, GN_SEARCH_COARSE,
+                                  GN_SEARCH_FINE};
+static const int64_t share_ns = INT64_C(100000000);
 /** How long that is soon after, ns. */
 static const int64_t soon_ns = INT64_C(500000000);
 
@@ -35,9 +39,11 @@ struct gn_watch {
     struct gn_search *search;
     struct gn_search_finds finds;
     int since_whole; // pictures since all of one was searched
-    bool with_small; // in this picture
+    unsigned looks;  // at this picture
+    bool is_live;
+    size_t n_shares; // looked for, all in all
     bool was_ever_seen;
-    int64_t last_seen_ns, last_whole_ns, last_small_ns;
+    int64_t last_seen_ns, last_whole_ns, last_small_ns, last_share_ns;
     struct gn_marker_window window;
     int n_last;
     struct followed last[GN_SEARCH_MAX_FOUND], next[GN_SEARCH_MAX_FOUND];
@@ -46,7 +52,7 @@ struct gn_watch {
     struct gn_watch_counts counts;
 };
 
-int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodies,
+int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodies, bool is_live,
                     struct gn_watch **out_watch, struct gn_error *out_error)
 {
     *out_watch = NULL;
@@ -64,6 +70,7 @@ int gn_watch_create(const struct gn_camera *camera, const struct gn_bodies *bodi
             .camera = camera, .dictionary = bodies->dictionary, .ids = ids, .n_ids = n};
         w->camera = camera;
         w->bodies = bodies;
+        w->is_live = is_live;
         w->strangers.dictionary = bodies->dictionary;
         w->since_whole = SEARCH_INTERVAL;
         err = gn_search_create(&wanted, &w->search, out_error);
@@ -124,7 +131,7 @@ static void sort_out(struct gn_watch *w)
 static int search(struct gn_watch *w, const struct gn_grey *grey,
                   const struct gn_marker_window *window, struct gn_error *out_error)
 {
-    int err = gn_search_find(w->search, grey, window, w->with_small, &w->finds, out_error);
+    int err = gn_search_find(w->search, grey, window, w->looks, &w->finds, out_error);
     if (err)
         return err;
     w->counts.n_coarse_corners += (uint64_t)w->finds.n_coarse;
@@ -174,17 +181,44 @@ static bool is_due(int64_t time_ns, int64_t last_ns, int64_t interval_ns)
     return time_ns <= last_ns || time_ns - last_ns >= interval_ns;
 }
 
-/** Whether it is time to search; notes in with_small whether for small markers too. */
-static bool is_search_due(struct gn_watch *w, int64_t time_ns)
+/** The shares that are due; all of them where time does not go on, or by more than they take. */
+static unsigned get_shares(struct gn_watch *w, int64_t time_ns)
+{
+    const int64_t n_all = GN_ARRAY_LEN(shares), since_ns = time_ns - w->last_share_ns;
+    unsigned looks = 0;
+    if (since_ns <= 0 || since_ns >= n_all * share_ns) {
+        w->last_share_ns = time_ns;
+        return GN_SEARCH_WHOLE | GN_SEARCH_SMALL;
+    }
+    for (; time_ns - w->last_share_ns >= share_ns; w->last_share_ns += share_ns)
+        looks |= shares[w->n_shares++ % GN_ARRAY_LEN(shares)];
+    return looks;
+}
+
+/** How to look at this picture now; 0: it is not time yet. */
+static unsigned get_looks(struct gn_watch *w, int64_t time_ns)
 {
     bool is_first = w->counts.n_searched_whole == 0;
     bool is_soon =
         w->n_last > 0 || (w->was_ever_seen && !is_due(time_ns, w->last_seen_ns, soon_ns));
+    if (w->is_live && !is_first && !is_soon)
+        return get_shares(w, time_ns);
+    w->last_share_ns = time_ns;
     const struct interval *least = is_soon ? &soon : &later;
-    w->with_small = is_first || is_due(time_ns, w->last_small_ns, least->small_ns);
-    if (w->with_small)
+    bool with_small = is_first || is_due(time_ns, w->last_small_ns, least->small_ns);
+    if (with_small)
         w->last_small_ns = time_ns;
-    return w->with_small || is_due(time_ns, w->last_whole_ns, least->whole_ns);
+    return with_small                                           ? GN_SEARCH_WHOLE | GN_SEARCH_SMALL
+           : is_due(time_ns, w->last_whole_ns, least->whole_ns) ? GN_SEARCH_WHOLE
+                                                                : 0;
+}
+
+static unsigned count_looks(unsigned looks)
+{
+    unsigned n = looks & GN_SEARCH_WHOLE ? 2 : 0;
+    for (; looks; looks >>= 1)
+        n += looks & 1;
+    return n;
 }
 
 /** Searches near where the last picture had markers, and everywhere where that finds fewer. */
@@ -196,9 +230,15 @@ static int search_again(struct gn_watch *w, const struct gn_grey *grey, int64_t 
         return err;
     w->since_whole = 0;
     w->last_whole_ns = time_ns;
-    w->strangers.n_ids = 0;
+    if (w->looks & (GN_SEARCH_WHOLE | GN_SEARCH_MIDDLE))
+        w->strangers.n_ids = 0;
     w->counts.n_searched_whole++;
-    return search(w, grey, NULL, out_error);
+    w->counts.n_looks += count_looks(w->looks);
+    err = search(w, grey, NULL, out_error);
+    // Other markers may be there that this share does not find: all is searched next.
+    if (!(w->looks & GN_SEARCH_WHOLE) && w->finds.n_found > 0)
+        w->since_whole = SEARCH_INTERVAL;
+    return err;
 }
 
 /** Keeps the sightings for following them into the next picture. */
@@ -219,6 +259,13 @@ static void remember(struct gn_watch *w)
     memcpy(w->last, next, (size_t)w->n_last * sizeof(*next));
     if (w->n_last > 0)
         set_window(w);
+}
+
+/** Whether it is time to look for markers of other dictionaries: as often as for small ones. */
+static bool is_foreign_due(const struct gn_watch *w)
+{
+    unsigned whole = GN_SEARCH_WHOLE | GN_SEARCH_SMALL;
+    return w->finds.n_found == 0 && ((w->looks & whole) == whole || w->looks & GN_SEARCH_MIDDLE);
 }
 
 /** Where nothing is seen: looks for markers of other dictionaries. */
@@ -243,9 +290,9 @@ int gn_watch_update(struct gn_watch *w, const struct gn_grey *grey, int64_t time
     w->since_whole++;
     if (is_near && follow(w, grey)) {
         w->counts.n_followed++;
-    } else if (is_search_due(w, time_ns)) {
+    } else if ((w->looks = get_looks(w, time_ns)) != 0) {
         err = search_again(w, grey, time_ns, is_near, out_error);
-        if (!err && w->with_small && w->finds.n_found == 0)
+        if (!err && is_foreign_due(w))
             err = look_for_others(w, grey, out_error);
     }
     if (err)

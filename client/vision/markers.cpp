@@ -125,6 +125,9 @@ int gn_marker_finder_create(const struct gn_marker_finder_options *options,
         finder->scale = o.is_small ? 2 : 1;
         if (o.is_small)
             look_closely(*finder->parameters);
+        if (o.window > 0)
+            finder->parameters->adaptiveThreshWinSizeMin =
+                finder->parameters->adaptiveThreshWinSizeMax = o.window;
         if (o.refinement == GN_MARKER_REFINE_NONE)
             finder->squares = std::make_unique<gn_squares>(finder->dictionary, finder->parameters);
         *out_finder = finder.release();

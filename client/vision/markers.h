@@ -56,6 +56,7 @@ struct gn_marker_finder_options {
     int dictionary; // index into GN_MARKER_DICTIONARIES
     enum gn_marker_refinement refinement;
     bool is_small; // looks for cells of 1.2 to 4 px, in the picture at twice its size
+    int window;    // of the mean that dark is told by, px, odd; 0: all of OpenCV's, 3, 13 and 23
 };
 
 /** Thread-safety: unsafe; OpenCV is kept to one thread. */

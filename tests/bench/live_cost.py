@@ -30,7 +30,7 @@ from pictures import exr_bytes  # noqa: E402
 
 GNOMON, FAKE, MAKE_SHOTS, RECORDED = sys.argv[3:7]
 N = int(sys.argv[7]) if len(sys.argv) > 7 else 45
-WARM_UP = 10
+WARM_UP = 25  # the daemon's first frames take longer than the camera's interval
 LIMIT_MS = 5
 MARKER = '6x6_250:0:0.08'
 SHOTS = (('one', 'one', 'cluttered'), ('none', 'none', 'plain'), ('clutter', 'none', 'cluttered'))

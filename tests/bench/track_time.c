@@ -79,7 +79,8 @@ static void measure(int row, const struct gn_rig_marker_camera *rig, int n_frame
         captures[i].data = files[i];
         captures[i].data_bytes = size;
     }
-    const struct gn_tracker_options options = {.camera = &camera, .bodies = &bodies};
+    const struct gn_tracker_options options = {
+        .camera = &camera, .bodies = &bodies, .is_live = true};
     gn_bench_check(gn_tracker_create(&options, &tracker, NULL), "tracker");
     for (int i = 0; i < n_frames + 3; i++) {
         double start_ms = get_processor_ms();

@@ -152,7 +152,8 @@ static void search_for(int dictionary, const int *ids, int n_ids, struct photo *
     const struct gn_search_options options = {
         .camera = &photo->camera, .dictionary = dictionary, .ids = ids, .n_ids = n_ids};
     assert_int_equal(gn_search_create(&options, &search, NULL), 0);
-    assert_int_equal(gn_search_find(search, &grey, NULL, true, &finds, NULL), 0);
+    assert_int_equal(
+        gn_search_find(search, &grey, NULL, GN_SEARCH_WHOLE | GN_SEARCH_SMALL, &finds, NULL), 0);
     gn_search_destroy(&search);
     assert_true(finds.n_found <= MAX_FOUND);
     photo->n_found = finds.n_found;

@@ -28,7 +28,7 @@ static struct gn_watch *create(void)
     static const struct gn_bodies bodies = {
         .n_bodies = 1, .bodies = {{.name = "world", .n_markers = 2, .markers = markers}}};
     struct gn_watch *watch = NULL;
-    assert_int_equal(gn_watch_create(&camera, &bodies, &watch, NULL), 0);
+    assert_int_equal(gn_watch_create(&camera, &bodies, false, &watch, NULL), 0);
     return watch;
 }
 
