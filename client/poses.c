@@ -34,6 +34,7 @@ struct gn_poses {
     bool has_told;
     char doubt[768]; // told last
     int64_t told_ns;
+    long n_damaged; // pictures of a camera
 };
 
 bool gn_poses_is_asked(const struct gn_options *options)
@@ -211,12 +212,18 @@ const char *gn_poses_get_doubt(const struct gn_poses *p)
 int gn_poses_take(struct gn_poses *p, const struct gn_capture *capture, struct gn_error *out_error)
 {
     int64_t time_ns = gn_poses_get_time_ns(capture);
-    int n_seen = gn_tracker_update(p->tracker, capture, time_ns, out_error);
-    int err = n_seen < 0 ? n_seen : 0;
-    if (!err)
-        doubt(p);
-    if (!err && p->dir)
-        err = draw(p, capture->name, out_error);
+    struct gn_error why = {0};
+    int n_seen = gn_tracker_update(p->tracker, capture, time_ns, &why);
+    if (n_seen == -EBADMSG && capture->time_ns != 0) {
+        if (p->n_damaged++ == 0)
+            fprintf(stderr, "gnomon: %s: %s; no markers are looked for in such pictures\n",
+                    capture->name, why.text);
+        return 0;
+    }
+    if (n_seen < 0)
+        return gn_error_set(out_error, n_seen, "%s", why.text);
+    doubt(p);
+    int err = p->dir ? draw(p, capture->name, out_error) : 0;
     if (!err && p->log)
         err = write_line(p, capture, time_ns, out_error);
     return err ? err : n_seen;
@@ -263,6 +270,8 @@ void gn_poses_print(struct gn_poses *p, FILE *out)
     if (c.n_misfits > 0)
         fprintf(out, "; %llu times they were not where they are listed",
                 (unsigned long long)c.n_misfits);
+    if (p->n_damaged > 0)
+        fprintf(out, "; %ld pictures were damaged", p->n_damaged);
     if (c.n_rest > 0)
         fprintf(out, "; at rest steps of %.3f mm RMS, %.3f as measured",
                 1e3 * sqrt(c.rest_steady_m2 / (double)c.n_rest),

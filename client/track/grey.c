@@ -32,8 +32,10 @@ int gn_grey_from_capture(const struct gn_capture *capture, struct gn_jpeg *jpeg,
         return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
                             capture->name, capture->width, capture->height, grey->width,
                             grey->height);
-    if (format == GN_CAPTURE_JPEG)
-        return gn_jpeg_decode(jpeg, capture->data, capture->data_bytes, grey, out_error);
+    if (format == GN_CAPTURE_JPEG) {
+        int err = gn_jpeg_decode(jpeg, capture->data, capture->data_bytes, grey, out_error);
+        return err == -EINVAL ? -EBADMSG : err;
+    }
     if (format == GN_CAPTURE_RGB_F32)
         return gn_error_set(out_error, -EINVAL,
                             "%s holds linear floats; markers are looked for in pictures of 8 to 16 "

@@ -70,7 +70,8 @@ void gn_tracker_destroy(struct gn_tracker **tracker);
 
 /**
  * Looks at the picture, taken at time_ns (any monotonic clock). Returns how many bodies are seen,
- * or a negative errno and a sentence: a picture that cannot be read or is not of the camera's size.
+ * or a negative errno and a sentence: -EBADMSG for a damaged picture, after which none is seen and
+ * the next may come; others for one that is not of the camera's size or kind.
  */
 GN_MUST_USE int gn_tracker_update(struct gn_tracker *tracker, const struct gn_capture *capture,
                                   int64_t time_ns, struct gn_error *out_error);
