@@ -288,7 +288,7 @@ static void live_pictures_share_the_search(void **state)
             for (size_t i = 0; i < GN_ARRAY_LEN(rates_hz); i++) {
                 const struct show show = {shots[k], empty_shot, rates_hz[i], true};
                 int n_before = 4 * (int)(0.5 * rates_hz[i] + 2);
-                for (int phase = 0; phase < 10; phase++) {
+                for (int phase = 0; phase < 12; phase += 3) {
                     int n = (int)rates_hz[i] + phase;
                     struct outcome o = lose_and_find(&show, n);
                     longest_s = fmax(longest_s, o.late_s);
