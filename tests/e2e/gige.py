@@ -187,6 +187,8 @@ def test_times():
             got = read_pictures('127.0.0.1', 'Mono12', 40, rate=50)
         # By their arrival they would be some ms off the camera's beat.
         assert got['off_ms'] < 0.3, (more, got)
+        # The middle of the exposure, 10 ms, which ended before the first packet left.
+        assert got['age_ms'][0] >= 5, (more, got)
     with Camera(*size(), '--chunks', '--fault', 'exposure'):  # no picture is before the one before
         read_pictures('127.0.0.1', 'Mono12', 20)
 
