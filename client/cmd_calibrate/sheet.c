@@ -27,7 +27,8 @@ struct sheet {
     double bottom_mm;       // where it ends
 };
 
-/** The drawing's size and the white around it; the sheet is as wide as its text at least. */
+/** The drawing's size and the white around it; the sheet is as wide as its text at least, up to 75
+ * letters of 1.6 mm. */
 static int begin(struct sheet *s, const char *path, double width_mm, double height_mm,
                  double margin_mm, struct gn_error *out_error)
 {
@@ -37,7 +38,7 @@ static int begin(struct sheet *s, const char *path, double width_mm, double heig
         return gn_error_set(out_error, -ENOMEM, "%s: out of memory", path);
     margin_mm = fmax(margin_mm, MARGIN_MM);
     s->is.ruler_mm = 100;
-    s->is.width_mm = fmax(width_mm + 2 * margin_mm, s->is.ruler_mm + 2 * MARGIN_MM);
+    s->is.width_mm = fmax(width_mm + 2 * margin_mm, s->is.ruler_mm + 4 * MARGIN_MM);
     s->is.height_mm = height_mm + 2 * margin_mm + FOOT_MM;
     s->left_mm = (s->is.width_mm - width_mm) / 2;
     s->top_mm = margin_mm;
@@ -97,14 +98,6 @@ static int put_marker(struct sheet *s, int dictionary, int id, double corners_mm
     return 0;
 }
 
-/** The name at that index of names that '|' separates. */
-static void print_name(FILE *out, const char *names, int index)
-{
-    for (; index > 0; index--)
-        names += strcspn(names, "|") + 1;
-    fprintf(out, "%.*s", (int)strcspn(names, "|"), names);
-}
-
 /** Ends the drawing; then the text is to be printed. */
 static void begin_text(struct sheet *s)
 {
@@ -162,6 +155,7 @@ int gn_sheet_write_board(const char *path, const struct gn_board *board,
                          struct gn_sheet_size *out_size, struct gn_error *out_error)
 {
     struct sheet s;
+    char name[32];
     double square = 1e3 * board->square_m;
     if (board->is_charuco && !gn_vision_is_built())
         return gn_feature_refuse(GN_FEATURE_VISION, out_error);
@@ -173,8 +167,8 @@ int gn_sheet_write_board(const char *path, const struct gn_board *board,
     fprintf(s.out, "%s %dx%d, squares of %g mm", board->is_charuco ? "ChArUco board" : "chessboard",
             board->columns, board->rows, square);
     if (board->is_charuco) {
-        fprintf(s.out, ", markers of %g mm, ", 1e3 * board->marker_m);
-        print_name(s.out, GN_MARKER_DICTIONARIES, board->dictionary);
+        gn_marker_print_name(board->dictionary, name, sizeof(name));
+        fprintf(s.out, ", markers of %g mm, %s", 1e3 * board->marker_m, name);
     }
     return finish(&s, path, err, out_size, out_error);
 }
@@ -215,6 +209,7 @@ int gn_sheet_write_body(const char *path, const struct gn_bodies *bodies, int bo
     const struct gn_body *b = &bodies->bodies[body];
     struct extent e;
     struct sheet s;
+    char name[32];
     if (!gn_vision_is_built())
         return gn_feature_refuse(GN_FEATURE_VISION, out_error);
     int err = measure(b, &e, out_error);
@@ -233,7 +228,8 @@ int gn_sheet_write_body(const char *path, const struct gn_bodies *bodies, int bo
         err = put_marker(&s, bodies->dictionary, b->markers[i].id, corners, out_error);
     }
     begin_text(&s);
-    print_name(s.out, GN_MARKER_DICTIONARIES, bodies->dictionary);
+    gn_marker_print_name(bodies->dictionary, name, sizeof(name));
+    fputs(name, s.out);
     if (b->n_markers == 1)
         fprintf(s.out, ", marker %d of %g mm", b->markers[0].id, 1e3 * e.side_m);
     else

@@ -128,7 +128,8 @@ def test_body():
     markers = {'dictionary': '4x4_50', 'bodies': [
         {'name': 'world', 'markers': [{'id': 7, 'size': 0.05},
                                       {'id': 8, 'size': 0.04, 'position': [0.1, 0.06, 0], 'orientation': turned}]},
-        {'name': 'box', 'markers': [{'id': 3, 'size': 0.05, 'position': [0, 0, 0.01]}]}]}
+        {'name': 'box', 'markers': [{'id': 3, 'size': 0.05, 'position': [0, 0, 0.01]}]},
+        {'name': 'back', 'markers': [{'id': 4, 'size': 0.05, 'orientation': [0, 1, 0, 0]}]}]}
     with Paper() as f:
         with open(f.at('markers.json'), 'w') as out:
             json.dump(markers, out)
@@ -138,9 +139,10 @@ def test_body():
         high = max(p[1] for q in quads for p in q)
         check_pose(body, size, low + 25, high - 25)
         assert body['markers'] == 2 and body['rms_px'] < 0.5, body
-        err = f.run('calibrate', 'print', '--markers', 'markers.json', '--body', 'box', '--out',
-                    'x.svg', status=1)
-        assert 'body "box": marker 3 does not lie in the plane' in err, err
+        for name, marker in (('box', 3), ('back', 4)):  # raised, and seen from behind
+            err = f.run('calibrate', 'print', '--markers', 'markers.json', '--body', name, '--out',
+                        'x.svg', status=1)
+            assert 'body "%s": marker %d does not lie in the plane' % (name, marker) in err, err
         err = f.run('calibrate', 'print', '--markers', 'markers.json', '--body', 'cup', '--out',
                     'x.svg', status=1)
         assert 'markers.json: there is no body called "cup"' in err, err
