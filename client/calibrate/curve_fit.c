@@ -262,13 +262,6 @@ double gn_curve_decode(const struct gn_curve *curve, double code)
     return fmax(exp((code - curve->a) / curve->b) - curve->c, 0);
 }
 
-double gn_curve_encode(const struct gn_curve *curve, double x)
-{
-    if (curve->model == GN_CURVE_LINEAR)
-        return curve->a + curve->b * x;
-    return curve->a + curve->b * log(curve->c + x);
-}
-
 void gn_curve_rescale(struct gn_curve *curve, double factor)
 {
     if (curve->model == GN_CURVE_LINEAR) {

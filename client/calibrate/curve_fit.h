@@ -58,8 +58,6 @@ GN_MUST_USE int gn_curve_fit(enum gn_curve_model model, struct gn_curve_sample *
 
 /** The light that gives a code; 0 at and below the dark. */
 double gn_curve_decode(const struct gn_curve *curve, double code);
-/** The code of light x >= 0. */
-double gn_curve_encode(const struct gn_curve *curve, double x);
 /** The same curve for light in units that are `factor` times as large: x_new = x / factor. */
 void gn_curve_rescale(struct gn_curve *curve, double factor);
 

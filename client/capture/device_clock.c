@@ -16,8 +16,7 @@ static int64_t map(struct gn_device_clock *c, uint64_t device_ns, int64_t arriva
     }
     int64_t device = (int64_t)device_ns, offset = arrival_ns - device;
     int64_t best = c->offsets[0] < c->offsets[1] ? c->offsets[0] : c->offsets[1];
-    if (!c->is_known || device <= c->device_ns || offset - best > MAX_JUMP_NS ||
-        best - offset > MAX_JUMP_NS) {
+    if (!c->is_known || device <= c->device_ns || offset - best > MAX_JUMP_NS) {
         c->is_known = true;
         c->device_ns = device;
         c->since_ns = arrival_ns;
