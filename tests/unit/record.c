@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "client/view/keep.h"
 #include "client/view/record.h"
 #include "common/file.h"
 #include "common/image_file.h"
@@ -204,6 +205,47 @@ static void test_refusals(void **state)
     assert_null(record);
 }
 
+/** What the window's keys keep: a recording that cannot be written ends, and another may begin. */
+static void test_keeping(void **state)
+{
+    (void)state;
+    struct gn_keep *keep = NULL;
+    struct gn_error error = {0};
+    struct gn_msg_result result = make_result(7);
+    struct gn_image8 none = {0}, picture = {0};
+    char text[256] = "", name[3000];
+    assert_int_equal(mkdir(dir, 0777), 0);
+    assert_int_equal(gn_keep_create(dir, &keep, &error), 0);
+    assert_int_equal(gn_keep_add(keep, &result, pixels, 1, &error), 0); // into none
+    assert_int_equal(gn_keep_picture(keep, 7, &none, text, sizeof(text), &error), -ENODATA);
+    assert_int_equal(gn_image8_init(&picture, 3, 2, 3), 0);
+    assert_int_equal(gn_keep_picture(keep, 7, &picture, text, sizeof(text), &error), 0);
+    assert_memory_equal(text, "kept unit_record.tmp/gnomon-", 28);
+    assert_int_equal(access(text + 5, F_OK), 0);
+    assert_int_equal(gn_keep_toggle(keep, text, sizeof(text), &error), 0);
+    assert_memory_equal(text, "recording: unit_record.tmp/", 27);
+    assert_int_equal(gn_keep_add(keep, &result, pixels, 1, &error), 0);
+    assert_int_equal(clean(NULL), 0);
+    assert_int_equal(gn_keep_add(keep, &result, pixels, 1, &error), -ENOENT);
+    assert_non_null(strstr(error.text, "frame000007.png"));
+    assert_false(gn_keep_is_recording(keep));
+    assert_int_equal(gn_keep_picture(keep, 7, &picture, text, sizeof(text), &error), -ENOENT);
+    assert_int_equal(gn_keep_toggle(keep, text, sizeof(text), &error), -ENOENT);
+    assert_false(gn_keep_is_recording(keep));
+    assert_int_equal(mkdir(dir, 0777), 0);
+    assert_int_equal(gn_keep_toggle(keep, text, sizeof(text), &error), 0);
+    assert_int_equal(gn_keep_add(keep, &result, pixels, 1, &error), 0);
+    assert_int_equal(gn_keep_toggle(keep, text, sizeof(text), &error), 0);
+    assert_memory_equal(text, "recorded 1 pictures: ", 21);
+    gn_keep_destroy(&keep);
+    gn_keep_destroy(&keep);
+    gn_image8_finish(&picture);
+    memset(name, 'n', sizeof(name) - 1);
+    name[sizeof(name) - 1] = '\0';
+    assert_int_equal(gn_keep_create(name, &keep, &error), -ENAMETOOLONG);
+    assert_null(keep);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -211,6 +253,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_empty_and_again, clean, clean),
         cmocka_unit_test_setup_teardown(test_jpeg, clean, clean),
         cmocka_unit_test_setup_teardown(test_refusals, clean, clean),
+        cmocka_unit_test_setup_teardown(test_keeping, clean, clean),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
