@@ -164,7 +164,7 @@ def test_refusals():
     black = DESK.write('black.png', png_bytes(640, 480, bytes(640 * 480), 1))
     lamps = DESK.write('lamps.txt', b'* 0 0 1\n* 1 0 0\n')
     for words, *more in (
-            ('degrees', '--markers', wrong, '--picture', DESK.at('wrong.png')),
+            ('size and position of each marker', '--markers', wrong, '--picture', DESK.at('wrong.png')),
             ('there is no body "world"', '--markers', nobody),
             ('give --lamps, or --markers', '--markers', markers, '--lamps', lamps),
             ('--fit is for --lamps', '--markers', markers, '--fit', 'lens'),
