@@ -81,8 +81,8 @@ int64_t gn_poses_get_time_ns(const struct gn_capture *capture);
 /**
  * Looks at the picture. Where some in a row speak against the list of the markers, a line on
  * stderr says what does not fit, seldom. A camera's picture that comes damaged shows no body, which
- * the first one tells on stderr; such a file is an error. Returns how many bodies are seen in it, or
- * a negative errno and a sentence.
+ * the first one tells on stderr; such a file is an error. Returns how many bodies are seen in it,
+ * or a negative errno and a sentence.
  */
 GN_MUST_USE int gn_poses_take(struct gn_poses *poses, const struct gn_capture *capture,
                               struct gn_error *out_error);
