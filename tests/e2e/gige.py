@@ -335,12 +335,15 @@ def test_overload():
         receiver = find_thread(tool.process, 'arv_gv_stream')
         os.sched_setaffinity(receiver, {cpu})
         os.sched_setscheduler(receiver, os.SCHED_IDLE, os.sched_param(0))
-        busy = [subprocess.Popen(['taskset', '-c', str(cpu), 'sh', '-c', 'while :; do :; done'])
-                for _ in range(3)]
-        time.sleep(3 * patience_s)
-        for process in busy:
-            process.kill()
-            process.wait()
+        busy = []
+        try:
+            for _ in range(3):
+                busy.append(subprocess.Popen(['taskset', '-c', str(cpu), 'sh', '-c', 'while :; do :; done']))
+            time.sleep(3 * patience_s)
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
         tool.process.send_signal(signal.SIGSTOP)
         time.sleep(2 * patience_s)
         tool.process.send_signal(signal.SIGCONT)

@@ -9,7 +9,8 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
+
+from folder import Folder
 
 GNOMOND, GNOMON, RENDER = sys.argv[1:4]
 SERVER = {'server', 'room', 'token'}
@@ -125,9 +126,9 @@ def check_accepted(name):
     command = [os.path.abspath(GNOMON)] + name.split()
     taken = {'help', 'version', 'gige'}
     for way in WAYS[name]:
-        with tempfile.TemporaryDirectory() as nowhere:
+        with Folder() as nowhere:
             done = subprocess.run(command + way.split(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                  timeout=60, stdin=subprocess.DEVNULL, text=True, cwd=nowhere)
+                                  timeout=60, stdin=subprocess.DEVNULL, text=True, cwd=nowhere.path)
         assert done.returncode == 1 and done.stderr.count('\n') == 1, (way, done)
         taken |= {word[5:] if word.startswith('--no-') else word[2:] for word in way.split() if word[:2] == '--'}
     listed = set(re.findall(r'^  --([a-z0-9-]+)', ask(*command, '--help'), re.M))
