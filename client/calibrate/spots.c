@@ -262,8 +262,8 @@ int gn_circle_find_disc(const struct gn_image *codes, const struct gn_image *lig
     struct gn_error why = {0};
     if (gn_circle_fit(points, n, 1.5, out_circle, &why) < 0)
         return gn_error_set(out_error, -EDOM,
-                            "no image circle in a dark surround is seen (%s); say --center and "
-                            "--radius",
+                            "no image circle in a dark surround is seen (%s); write \"center\" "
+                            "and \"radius\", in px, into probe.json instead of --find-circle",
                             why.text);
     return 0;
 }

@@ -51,8 +51,9 @@ int gn_gige_exposure_hold(struct gn_gige_device *device, const char *id, enum gn
     GError *error = NULL;
     int err = 0;
     if (unit != GN_EXPOSURE_US)
-        return gn_error_set(out_error, -ENOTSUP,
-                            "camera %s: its exposure is set by times, not by counts", id);
+        return gn_error_set(
+            out_error, -ENOTSUP,
+            "camera %s: its exposure is set by times, not by counts: give a unit, as 4,1,16ms", id);
     if (!arv_camera_is_exposure_time_available(device->camera, NULL))
         return gn_error_set(out_error, -ENOTSUP, "camera %s: no exposure time can be set", id);
     for (size_t i = 0; !err && i < GN_ARRAY_LEN(automatics); i++)

@@ -249,9 +249,10 @@ int gn_v4l2_exposure_hold(const struct gn_v4l2_device *device, enum gn_exposure_
         bool has_other = find_control(
             device, unit == GN_EXPOSURE_US ? V4L2_CID_EXPOSURE : V4L2_CID_EXPOSURE_ABSOLUTE, &q);
         (void)!refuse(device,
-                      !has_other               ? "no exposure can be set"
-                      : unit == GN_EXPOSURE_US ? "it counts its exposure: no times can be set"
-                                               : "its exposure is set by times, not by counts",
+                      !has_other ? "no exposure can be set"
+                      : unit == GN_EXPOSURE_US
+                          ? "it counts its exposure: no times can be set"
+                          : "its exposure is set by times, not by counts: give a unit, as 4,1,16ms",
                       out_error);
         return -ENOTSUP;
     }

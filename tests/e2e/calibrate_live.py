@@ -279,7 +279,7 @@ def test_response_ends():
                         break
                 assert process.returncode == 1 and 'interrupted after' in read_end(err), (process.returncode, err)
             for exposures, words in (('10,20000ms', '2e+07 us is not in [10, 1e+07] us'),
-                                     ('1,2,4', 'its exposure is set by times, not by counts'),
+                                     ('1,2,4', 'its exposure is set by times, not by counts: give a unit'),
                                      ('1ms,2', 'as 1,2,4,8ms'), ('1,2parsecs', 'as 1,2,4,8ms'),
                                      ('0ms', 'as 1,2,4,8ms')):
                 err = run(*response(f, '--exposures', exposures), status=1)

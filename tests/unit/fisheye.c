@@ -354,6 +354,7 @@ static void test_image_circle(void **unused)
         image.data[i] = 0.3f;
     assert_int_equal(gn_circle_find_disc(&image, &image, &circle, &e), -EDOM);
     assert_non_null(strstr(e.text, "no image circle"));
+    assert_non_null(strstr(e.text, "write \"center\" and \"radius\", in px, into probe.json"));
     gn_image_finish(&image);
 }
 

@@ -730,7 +730,7 @@ static void test_exposure_is_held_and_put_back(void **state)
     struct gn_source *source = open_camera(&fake, NULL);
     assert_int_equal(gn_source_restore_exposure(source, &error), 0); // nothing is held
     assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_COUNTS, &range, &error), -ENOTSUP);
-    assert_non_null(strstr(error.text, "its exposure is set by times, not by counts"));
+    assert_non_null(strstr(error.text, "its exposure is set by times, not by counts: give a unit"));
     assert_int_equal(get_value(&fake, V4L2_CID_AUTOGAIN), 1);
     assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_US, &range, &error), 0);
     assert_true(range.now == 25000 && range.least == 300 && range.most == 204700);
