@@ -195,8 +195,10 @@ int gn_camera_read_json(const struct gn_json *object, bool needs_pose, struct gn
                                        "world_from_camera"};
     struct gn_camera camera = {.response = {.type = GN_RESPONSE_SRGB},
                                .world_from_camera = {.rotation = {1.0}}};
-    int ret =
-        gn_json_check_keys(object, keys, GN_ARRAY_LEN(keys) - (needs_pose ? 0 : 1), out_error);
+    int ret = gn_json_check_keys(object, keys, GN_ARRAY_LEN(keys), out_error);
+    if (ret == 0 && !needs_pose && gn_json_has(object, "world_from_camera"))
+        ret = gn_json_refuse(object, "world_from_camera", out_error,
+                             "not here: each frame says its own");
     if (ret == 0)
         ret = read_intrinsics(object, &camera, out_error);
     if (ret == 0 && needs_pose)

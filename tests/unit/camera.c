@@ -259,6 +259,8 @@ static void test_read_errors(void **unused)
          ": unknown key 'distorsion'; did you mean 'distortion'?"},
         {"{" SIZES LENS POSE ",\"fov\":0}", ": unknown key 'fov'; known are width, height, fx, fy"},
         {"{" SIZES LENS "}", ": world_from_camera: missing: where the camera is, 16 numbers"},
+        {"{" SIZES LENS ",\"world_from_camra\":0}",
+         ": unknown key 'world_from_camra'; did you mean 'world_from_camera'?"},
         {"{" LENS "}", ": not JSON"},
         {"{\"width\":\"640\"}", ": width: expected a whole number, found a string"},
         {"{\"width\":640.5}", ": width: expected a whole number in [1, 16384], found 640.5"},

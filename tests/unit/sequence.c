@@ -79,6 +79,7 @@ static void test_refusals(void **state)
         {FORMAT ", \"camera\": {}", "camera.width: missing"},
         {FORMAT ", " CAMERA, "environment: missing"},
         {FORMAT ", " CAMERA ", \"environment\": {\"projection\": \"x\"}", "environment.projection"},
+        {FORMAT ", \"camera\": {\"width\": 8, " POSE(1) "}", "camera.world_from_camera: not here"},
         {HEAD, "frames: missing"},
         {HEAD ", \"frames\": []", "frames"},
         {HEAD ", \"frames\": [3]", "frames[0]"},
