@@ -189,7 +189,7 @@ struct probe {
     struct gn_msg_environment_frame frame; // what all have in common
     uint64_t first_sequence;
     struct gn_halves halves;
-    bool has_told_halves;
+    bool has_told_halves, has_told_light;
     struct buffer masked;  // a picture, its masks filled
     struct buffer payload; // the response's table and a picture
 };
@@ -315,6 +315,25 @@ static int open_source(struct gn_feed *r, const struct gn_options *options,
     return err;
 }
 
+/** Says once that floats, light as it seems, are taken for codes, which end at 1. */
+static void tell_light(struct probe *p, const struct gn_capture *capture)
+{
+    if (p->has_told_light || capture->format != GN_CAPTURE_RGB_F32 ||
+        p->setup.response.type == GN_RESPONSE_LINEAR)
+        return;
+    const float *values = (const float *)(const void *)capture->data;
+    float largest = 0;
+    for (size_t i = 0; i < capture->data_bytes / sizeof(float); i++)
+        largest = values[i] > largest ? values[i] : largest;
+    if (largest <= 1)
+        return;
+    p->has_told_light = true;
+    fprintf(stderr,
+            "%s: %s has values up to %.4g, and codes end at 1: if it is light, the setup must "
+            "not give a \"response\" other than linear\n",
+            program.name, capture->name, (double)largest);
+}
+
 static int send_capture(struct gn_feed *r, const struct gn_capture *capture,
                         struct gn_error *out_error)
 {
@@ -322,6 +341,8 @@ static int send_capture(struct gn_feed *r, const struct gn_capture *capture,
     struct pixels pixels;
     struct gn_capture shown = *capture;
     int err = check_capture(&p->setup, capture, out_error);
+    if (!err)
+        tell_light(p, capture);
     if (!err)
         err = gn_feed_wait(r, capture, out_error);
     if (!err)

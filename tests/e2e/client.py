@@ -289,7 +289,12 @@ def test_probe_files():
         bench.write('codes.png', png_bytes(32, 16, bytes(3 * 512)))
         bench.write('wide.exr', exr_bytes(4097, 1, (1, 1, 1)))
         bench.write('no.exr', b'nothing')
-        probe(daemon, bench, '--setup', setup_file, files='log.png').succeed()
+        for name, value in (('bright', 3), ('dim', 1)):  # light, or codes, as floats
+            bench.write(name + '.exr', exr_bytes(32, 32, (value, 0, 0)))
+        status, out, err = probe(daemon, bench, '--setup', setup_file, '--loop', '--count', '2', files='bright.exr').end()
+        assert status == 0 and 'environment frame 2' in out and err.count('\n') == 1, (status, out, err)
+        assert 'bright has values up to 3, and codes end at 1' in err, err
+        probe(daemon, bench, '--setup', setup_file, files='dim.exr').succeed()
         view(daemon, bench, '--count', '1').succeed()  # in that light
         viewer = view(daemon, bench, '--loop', '--rate', '5', out='loop')
         viewer.wait_for('frame 1:')
@@ -350,7 +355,7 @@ def test_view_files():
         bench.write('long/' + 'n' * 251 + '.png', good)
         with open(os.path.join(os.fsencode(bench.at('raw')), b'a\xff\x1b[2J.png'), 'wb') as out:
             out.write(good)
-        for files, words in (('wide', ['b is 8x8, but the camera is 64x48']),
+        for files, words in (('wide', ['b is 8x8, but the camera was calibrated at 64x48']),
                              ('deep', ['a is no 8-bit picture']),
                              ('broken', ['a.png']),
                              ('empty', ['no picture in this folder']),
