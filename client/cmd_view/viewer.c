@@ -153,14 +153,18 @@ static int check_answers(const struct gn_viewer *v, struct gn_error *out_error)
 static void show_trouble(struct gn_viewer *v)
 {
     int64_t longest_ns = 0, now_ns = gn_client_now_ns();
+    bool waits_light = false;
     char text[320] = "";
     for (int i = 0; i < GN_VIEWER_MAX_OUTSTANDING; i++) {
         const struct gn_viewer_pending *p = &v->pending[i];
-        if (p->id && now_ns - p->sent_ns > longest_ns)
+        if (p->id && now_ns - p->sent_ns > longest_ns) {
             longest_ns = now_ns - p->sent_ns;
+            waits_light = p->waits_light;
+        }
     }
     if (longest_ns > SILENCE_NS)
-        snprintf(text, sizeof(text), "no answer for %d s", (int)(longest_ns / GN_NS_PER_S));
+        snprintf(text, sizeof(text), "no answer for %d s%s", (int)(longest_ns / GN_NS_PER_S),
+                 waits_light ? "; is a gnomon probe running?" : "");
     else if (v->n_dropped_since >= DROPPED_MIN)
         snprintf(text, sizeof(text), "no picture: %s", v->last_drop);
     else if (v->poses && gn_poses_get_doubt(v->poses))

@@ -24,6 +24,7 @@ struct gn_viewer_pending {
     uint64_t id;
     int64_t sent_ns;
     bool wants_virtual; // virtual objects are to be in the picture
+    bool waits_light;   // the server may hold it until there is light
     char name[GN_FILE_NAME_BYTES];
 };
 

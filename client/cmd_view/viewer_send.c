@@ -67,9 +67,9 @@ int gn_viewer_send(struct gn_feed *r, const struct gn_capture *capture, struct g
                             "%s is no 8-bit picture; camera frames are 8-bit PNG or JPEG",
                             capture->name);
     if (capture->width != v->camera.width || capture->height != v->camera.height)
-        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
-                            capture->name, capture->width, capture->height, v->camera.width,
-                            v->camera.height);
+        return gn_error_set(out_error, -EINVAL,
+                            "%s is %dx%d, but the camera was calibrated at %dx%d", capture->name,
+                            capture->width, capture->height, v->camera.width, v->camera.height);
     struct gn_viewer_pending *p = gn_viewer_get_free(v);
     struct gn_msg_frame frame = v->frame;
     frame.id = (uint64_t)r->n_sent + 1;
@@ -84,8 +84,10 @@ int gn_viewer_send(struct gn_feed *r, const struct gn_capture *capture, struct g
     if (err)
         return err;
     set_light_wanted(v, &frame);
-    *p = (struct gn_viewer_pending){
-        .id = frame.id, .sent_ns = gn_client_now_ns(), .wants_virtual = !frame.no_virtual};
+    *p = (struct gn_viewer_pending){.id = frame.id,
+                                    .sent_ns = gn_client_now_ns(),
+                                    .wants_virtual = !frame.no_virtual,
+                                    .waits_light = frame.lighting_wait_ms > 0};
     snprintf(p->name, sizeof(p->name), "%s", capture->name);
     err = gn_client_send_frame(r->client, &frame, capture->data, capture->data_bytes);
     if (err) {

@@ -29,9 +29,9 @@ int gn_grey_from_capture(const struct gn_capture *capture, struct gn_jpeg *jpeg,
     size_t n = (size_t)capture->width * (size_t)capture->height;
     enum gn_capture_format format = capture->format;
     if (capture->width != grey->width || capture->height != grey->height || grey->channels != 1)
-        return gn_error_set(out_error, -EINVAL, "%s is %dx%d, but the camera is %dx%d",
-                            capture->name, capture->width, capture->height, grey->width,
-                            grey->height);
+        return gn_error_set(out_error, -EINVAL,
+                            "%s is %dx%d, but the camera was calibrated at %dx%d", capture->name,
+                            capture->width, capture->height, grey->width, grey->height);
     if (format == GN_CAPTURE_JPEG) {
         int err = gn_jpeg_decode(jpeg, capture->data, capture->data_bytes, grey, out_error);
         return err == -EINVAL ? -EBADMSG : err;
