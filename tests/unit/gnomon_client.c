@@ -74,6 +74,8 @@ static void answer_frame(struct gn_conn *conn, const struct gn_msg_frame *frame,
 static void answer_ping(struct server *s, struct gn_conn *conn, int64_t t1_ns)
 {
     int64_t now = gn_clock_get_monotonic_ns() + atomic_load(&s->ahead_ns);
+    int64_t wrong = now + GN_NS_PER_S; // to a PING that never was: no sample
+    answer(conn, GN_WIRE_PONG, &(struct gn_msg_pong){t1_ns - 1, wrong, wrong}, NULL);
     answer(conn, GN_WIRE_PONG, &(struct gn_msg_pong){t1_ns, now, now}, NULL);
 }
 

@@ -22,14 +22,19 @@ static const struct gn_camera camera = {.width = WIDTH,
                                         .world_from_camera = {.rotation = {1, 0, 0, 0}}};
 
 /** A watch for markers 7 and 9. */
-static struct gn_watch *create(void)
+static struct gn_watch *create_for(bool is_live)
 {
     static struct gn_body_marker markers[2] = {{.id = 7}, {.id = 9}};
     static const struct gn_bodies bodies = {
         .n_bodies = 1, .bodies = {{.name = "world", .n_markers = 2, .markers = markers}}};
     struct gn_watch *watch = NULL;
-    assert_int_equal(gn_watch_create(&camera, &bodies, false, &watch, NULL), 0);
+    assert_int_equal(gn_watch_create(&camera, &bodies, is_live, &watch, NULL), 0);
     return watch;
+}
+
+static struct gn_watch *create(void)
+{
+    return create_for(false);
 }
 
 /** Shows it what is drawn; returns how many markers it sees. */
@@ -133,6 +138,50 @@ static void times_that_go_back_are_no_reason_to_wait(void **state)
     struct gn_watch *watch = create();
     gn_paper_clear();
     assert_int_equal(show(watch, INT64_C(60000000000)), 0);
+    gn_paper_put(7, 30, 40, 8);
+    assert_int_equal(show(watch, 0), 1);
+    gn_watch_destroy(&watch);
+}
+
+/** Live, a second of nothing: the search is shared from here on. Returns the next picture's time.
+ */
+static int64_t show_nothing(struct gn_watch *watch)
+{
+    gn_paper_clear();
+    for (int i = 0; i < 50; i++)
+        assert_int_equal(show(watch, i * frame_ns), 0);
+    return 50 * frame_ns;
+}
+
+static void where_a_share_finds_one_all_is_searched_next(void **state)
+{
+    (void)state;
+    struct gn_watch *watch = create_for(true);
+    int64_t time_ns = show_nothing(watch);
+    int n = 0;
+    gn_paper_put(7, 30.3, 40.6, 8);
+    gn_paper_put(9, 151.01, 60.41, 1.2); // which no share finds that finds the other
+    for (int i = 0; i < 20 && n == 0; i++, time_ns += frame_ns)
+        n = show(watch, time_ns);
+    assert_int_equal(n, 1);
+    assert_int_equal(show(watch, time_ns), 2);
+    gn_watch_destroy(&watch);
+}
+
+static void shares_tell_of_other_dictionaries_and_times_that_go_back(void **state)
+{
+    (void)state;
+    struct gn_watch *watch = create_for(true);
+    struct gn_foreign_finds finds;
+    uint8_t white[GN_PAPER_MAX_CELLS];
+    int64_t time_ns = show_nothing(watch);
+    int side = gn_marker_get_cells(gn_marker_find_dictionary("6x6_250", 7), 100, white);
+    gn_paper_put_cells(white, side, 140, 40, 8, 20);
+    assert_false(gn_watch_get_foreign(watch, &finds));
+    for (int i = 0; i < 21; i++, time_ns += frame_ns)
+        assert_int_equal(show(watch, time_ns), 0);
+    assert_true(gn_watch_get_foreign(watch, &finds));
+    assert_int_equal(finds.ids[0], 100);
     gn_paper_put(7, 30, 40, 8);
     assert_int_equal(show(watch, 0), 1);
     gn_watch_destroy(&watch);
@@ -285,6 +334,8 @@ int main(void)
         cmocka_unit_test(what_leaps_is_looked_for_near_by),
         cmocka_unit_test(a_second_one_is_found_beside_the_followed),
         cmocka_unit_test(times_that_go_back_are_no_reason_to_wait),
+        cmocka_unit_test(where_a_share_finds_one_all_is_searched_next),
+        cmocka_unit_test(shares_tell_of_other_dictionaries_and_times_that_go_back),
         cmocka_unit_test(others_of_the_dictionary_are_told_and_then_no_other_dictionary),
         cmocka_unit_test(no_square_is_read_as_what_it_is_not),
         cmocka_unit_test(what_is_hardly_darker_than_paper_is_not_read),
