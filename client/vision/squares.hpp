@@ -3,7 +3,7 @@
 /*
  * Markers in a picture: what cv::aruco::detectMarkers() finds without refinement, several times
  * sooner where the picture is full of dark and light specks. The method is that of Garrido-Jurado,
- * Munoz-Salinas, Madrid-Cuevas and Marin-Jimenez 2014, sections 4.1 and 4.2.
+ * Munoz-Salinas, Madrid-Cuevas and Marin-Jimenez 2014 (Pattern Recognition 47), section 4.
  */
 #ifndef GN_CLIENT_VISION_SQUARES_HPP
 #define GN_CLIENT_VISION_SQUARES_HPP

@@ -787,6 +787,8 @@ static void test_exposure_by_counts_or_not_at_all(void **state)
     assert_non_null(strstr(error.text, "it counts its exposure: no times can be set"));
     assert_int_equal(gn_source_hold_exposure(source, GN_EXPOSURE_COUNTS, &range, &error), 0);
     assert_true(range.now == 250 && range.least == 3 && range.most == 2047);
+    assert_int_equal(gn_source_set_exposure(source, 2047.5, &took, &error), 0);
+    assert_true(took == 2047); // what lies between is rounded, but not to what it refuses
     assert_int_equal(gn_source_set_exposure(source, 100, &took, &error), 0);
     assert_true(took == 100);
     assert_int_equal(gn_source_restore_exposure(source, &error), 0);
