@@ -138,16 +138,16 @@ static void judge(struct gn_curve_work *f, int n_theta, double cost, int n_free,
                   struct gn_curve *out)
 {
     gn_curve_linearise(f);
-    double norm[2] = {0}, s[2], v[4];
-    for (int i = 0; i < f->n; i++)
-        for (int j = 0; j < n_theta; j++)
-            norm[j] = hypot(norm[j], f->kept[2 * i + j]);
-    for (int i = 0; i < f->n; i++) // packed in place: row i is read before it is written
-        for (int j = 0; j < n_theta; j++)
-            f->rows[i * n_theta + j] = f->rows[2 * i + j] / norm[j];
+    double norm[2], s[2], v[4];
+    for (int j = 0; j < n_theta; j++)
+        norm[j] = gn_solve_get_length(f->kept + j, f->n, 2);
+    double *packed = f->kept; // norm has what is wanted of it
+    for (int j = 0; j < n_theta; j++)
+        for (int i = 0; i < f->n; i++)
+            packed[i * n_theta + j] = f->rows[2 * i + j] / norm[j];
     out->condition = INFINITY;
     out->b_error = INFINITY;
-    if (gn_solve_svd(f->rows, f->n, n_theta, s, v) < 0 || !(s[n_theta - 1] > 0))
+    if (gn_solve_svd(packed, f->n, n_theta, s, v) < 0 || !(s[n_theta - 1] > 0))
         return;
     double sigma = sqrt(cost / (n_free > 0 ? n_free : 1)), error[2] = {0};
     for (int j = 0; j < n_theta; j++)

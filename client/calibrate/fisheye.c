@@ -196,8 +196,7 @@ static int judge(const struct fit *f, struct scratch *w, struct gn_fisheye_sight
                             out->condition, GN_FISHEYE_MAX_CONDITION);
     memcpy(w->copy, w->jacobian, (size_t)(m * k) * sizeof(double));
     for (int j = 0; j < k; j++) {
-        for (int i = 0; i < m; i++)
-            norm[j] = hypot(norm[j], w->copy[i * k + j]);
+        norm[j] = gn_solve_get_length(w->copy + j, m, k);
         for (int i = 0; i < m; i++)
             w->copy[i * k + j] /= norm[j];
     }

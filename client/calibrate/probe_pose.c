@@ -231,11 +231,10 @@ static int choose(const struct problem *p, const struct gn_pose *pose, double *s
 static int judge(const struct problem *p, double unit2, struct gn_probe_pose *out)
 {
     int m = 8 * p->n;
-    double norm[UNKNOWNS] = {0}, s[UNKNOWNS], v[UNKNOWNS * UNKNOWNS];
+    double norm[UNKNOWNS], s[UNKNOWNS], v[UNKNOWNS * UNKNOWNS];
     fill(p, &out->world_from_probe);
     for (int k = 0; k < UNKNOWNS; k++) {
-        for (int i = 0; i < m; i++)
-            norm[k] = hypot(norm[k], p->jacobian[i * UNKNOWNS + k]);
+        norm[k] = gn_solve_get_length(p->jacobian + k, m, UNKNOWNS);
         for (int i = 0; i < m; i++)
             p->jacobian[i * UNKNOWNS + k] /= norm[k];
     }

@@ -7,13 +7,20 @@
 #include <math.h>
 #include <string.h>
 
+double gn_solve_get_length(const double *column, int n, int stride)
+{
+    double length = 0;
+    for (int i = 0; i < n; i++)
+        length = hypot(length, column[i * stride]);
+    return length;
+}
+
 /* Reflects column k onto its diagonal, and the columns right of it and b along, row by row as they
  * lie in memory. Returns the length that the column has left below the rows done. */
 static double reflect(double *a, double *b, int m, int n, int k)
 {
-    double norm = 0, dot[GN_SOLVE_MAX_COLUMNS + 1] = {0};
-    for (int i = k; i < m; i++)
-        norm = hypot(norm, a[i * n + k]);
+    double norm = gn_solve_get_length(a + k * n + k, m - k, n);
+    double dot[GN_SOLVE_MAX_COLUMNS + 1] = {0};
     if (!(norm > 0))
         return norm;
     double alpha = a[k * n + k] > 0 ? -norm : norm;
@@ -41,9 +48,7 @@ int gn_solve_least_squares(double *a, double *b, int m, int n, double *out_x)
     if (m < n || n < 1 || n > GN_SOLVE_MAX_COLUMNS)
         return -EDOM;
     for (int k = 0; k < n; k++) {
-        double whole = 0;
-        for (int i = 0; i < m; i++)
-            whole = hypot(whole, a[i * n + k]);
+        double whole = gn_solve_get_length(a + k, m, n);
         // The part above the diagonal is R's; what is left must be more than its rounding.
         double left = reflect(a, b, m, n, k);
         if (!(left > 4 * DBL_EPSILON * n * whole) || !isfinite(left))
@@ -64,9 +69,7 @@ int gn_solve_least_squares(double *a, double *b, int m, int n, double *out_x)
 int gn_solve_damped_squares(double *a, double *b, int m, int n, double damping, double *out_x)
 {
     for (int j = 0; j < n; j++) {
-        double norm = 0;
-        for (int i = 0; i < m; i++)
-            norm = hypot(norm, a[i * n + j]);
+        double norm = gn_solve_get_length(a + j, m, n);
         for (int i = 0; i < n; i++)
             a[(m + j) * n + i] = i == j ? sqrt(damping) * norm : 0;
         b[m + j] = 0;
@@ -133,9 +136,7 @@ int gn_solve_svd(double *a, int m, int n, double *out_s, double *out_v)
                 turned += orthogonalise(a, m, n, p, q, out_v);
     }
     for (int j = 0; j < n; j++) {
-        double norm = 0;
-        for (int i = 0; i < m; i++)
-            norm = hypot(norm, a[i * n + j]);
+        double norm = gn_solve_get_length(a + j, m, n);
         out_s[j] = norm * scale;
         for (int i = 0; i < m && norm > 0; i++)
             a[i * n + j] /= norm;
@@ -157,9 +158,7 @@ double gn_solve_get_condition(double *a, int m, int n)
 {
     double s[GN_SOLVE_MAX_SVD], v[GN_SOLVE_MAX_SVD * GN_SOLVE_MAX_SVD];
     for (int j = 0; j < n; j++) {
-        double norm = 0;
-        for (int i = 0; i < m; i++)
-            norm = hypot(norm, a[i * n + j]);
+        double norm = gn_solve_get_length(a + j, m, n);
         if (!(norm > 0) || !isfinite(norm))
             return INFINITY;
         for (int i = 0; i < m; i++)
@@ -181,11 +180,10 @@ static void complete(double u[static 9], const double s[static 3])
 {
     if (s[1] <= 4 * DBL_EPSILON * s[0]) { // any direction across the first
         int i = fabs(u[0]) < 0.6 ? 0 : 3; // an axis that it does not lie along
-        double dot = u[i], norm = 0;
+        double dot = u[i];
         for (int k = 0; k < 9; k += 3)
             u[k + 1] = (k == i) - dot * u[k];
-        for (int k = 0; k < 9; k += 3)
-            norm = hypot(norm, u[k + 1]);
+        double norm = gn_solve_get_length(u + 1, 3, 3);
         for (int k = 0; k < 9; k += 3)
             u[k + 1] /= norm;
     }

@@ -15,6 +15,10 @@
 /** Columns of a matrix whose singular values are asked for. */
 #define GN_SOLVE_MAX_SVD 32
 
+/** The length of n numbers that are stride apart, such as a matrix' column; it neither overflows
+ * nor vanishes before they do. */
+double gn_solve_get_length(const double *column, int n, int stride);
+
 /**
  * Minimises |a x - b|. a[m][n] row-major and b[m] are overwritten; m >= n,
  * n in [1, GN_SOLVE_MAX_COLUMNS].
