@@ -8,6 +8,14 @@
 
 static uint8_t pixels[GN_PAPER_WIDTH * GN_PAPER_HEIGHT];
 
+const struct gn_camera gn_paper_camera = {.width = GN_PAPER_WIDTH,
+                                          .height = GN_PAPER_HEIGHT,
+                                          .fx = 400,
+                                          .fy = 400,
+                                          .cx = 120,
+                                          .cy = 80,
+                                          .world_from_camera = {.rotation = {1, 0, 0, 0}}};
+
 void gn_paper_clear(void)
 {
     memset(pixels, 204, sizeof(pixels));

@@ -8,12 +8,16 @@
 
 #include "client/track/quad.h"
 #include "client/vision/markers.h"
+#include "common/camera.h"
 
 enum {
     GN_PAPER_WIDTH = 240,
     GN_PAPER_HEIGHT = 160,
     GN_PAPER_MAX_CELLS = GN_MARKER_MAX_CELLS * GN_MARKER_MAX_CELLS,
 };
+
+/** A camera 0.4 m above the paper, whose pixels are millimetres there. */
+extern const struct gn_camera gn_paper_camera;
 
 /** Makes all of it white. */
 void gn_paper_clear(void);

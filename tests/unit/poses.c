@@ -14,15 +14,6 @@
 
 enum { WIDTH = GN_PAPER_WIDTH, HEIGHT = GN_PAPER_HEIGHT };
 
-/* The paper is 0.4 m away: a pixel is a millimetre. */
-static const struct gn_camera camera = {.width = WIDTH,
-                                        .height = HEIGHT,
-                                        .fx = 400,
-                                        .fy = 400,
-                                        .cx = 120,
-                                        .cy = 80,
-                                        .world_from_camera = {.rotation = {1, 0, 0, 0}}};
-
 static const struct gn_option option_table[] = {GN_LIVE_OPTIONS, GN_POSES_OPTIONS};
 static const struct gn_program program = {.name = "poses",
                                           .usage = "",
@@ -68,7 +59,7 @@ static void a_damaged_picture_has_no_pose(void **state)
     capture.data = data;
     assert_int_equal(gn_options_create(&program, &options), 0);
     assert_int_equal(gn_options_read_arguments(options, 3, words, NULL), 0);
-    assert_int_equal(gn_poses_open(options, &camera, NULL, &poses, NULL), 0);
+    assert_int_equal(gn_poses_open(options, &gn_paper_camera, NULL, &poses, NULL), 0);
 
     assert_int_equal(gn_poses_take(poses, &capture, &why), 1);
     uint8_t kept[16], *middle = data + capture.data_bytes / 2;

@@ -15,15 +15,6 @@
 
 enum { WIDTH = GN_PAPER_WIDTH, HEIGHT = GN_PAPER_HEIGHT };
 
-/** The paper is 0.4 m away: a pixel is a millimetre. */
-static const struct gn_camera camera = {.width = WIDTH,
-                                        .height = HEIGHT,
-                                        .fx = 400,
-                                        .fy = 400,
-                                        .cx = 120,
-                                        .cy = 80,
-                                        .world_from_camera = {.rotation = {1, 0, 0, 0}}};
-
 /** A marker of 48 mm whose middle is there, mm, y up. */
 static void list_marker(int id, double x_mm, double y_mm, struct gn_body_marker *out)
 {
@@ -40,7 +31,7 @@ static struct gn_tracker *create(const struct gn_bodies *bodies, bool is_raw)
 {
     struct gn_tracker *tracker = NULL;
     const struct gn_tracker_options options = {
-        .camera = &camera, .bodies = bodies, .is_raw = is_raw};
+        .camera = &gn_paper_camera, .bodies = bodies, .is_raw = is_raw};
     assert_int_equal(gn_tracker_create(&options, &tracker, NULL), 0);
     return tracker;
 }
